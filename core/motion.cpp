@@ -1,0 +1,177 @@
+#include "core/motion.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <stdexcept>
+
+namespace unrig {
+namespace {
+
+using Eigen::Index;
+using Eigen::VectorXd;
+
+/// Coefficients of a cubic B-spline stretched by `stride` in splines on the fine knots: four boxes of that width, convolved.
+VectorXd two_scale(Index stride) {
+  VectorXd mask = VectorXd::Ones(1);
+  for (int box = 0; box < 4; ++box) {
+    VectorXd wider = VectorXd::Zero(mask.size() + stride - 1);
+    for (Index k = 0; k < stride; ++k) wider.segment(k, mask.size()) += mask;
+    mask = wider;
+  }
+  const double s = static_cast<double>(stride);
+  return mask / (s * s * s);
+}
+
+double median(std::vector<double>& values) {
+  if (values.empty()) return 0;
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
+double median_of_five(const VectorXd& x, Index k) {
+  std::array<double, 5> near{};
+  int count = 0;
+  for (Index i = std::max<Index>(0, k - 2); i <= std::min(x.size() - 1, k + 2); ++i)
+    if (std::isfinite(x[i])) near[static_cast<std::size_t>(count++)] = x[i];
+  if (count == 0) return std::nan("");
+  std::nth_element(near.begin(), near.begin() + count / 2, near.begin() + count);
+  return near[static_cast<std::size_t>(count / 2)];
+}
+
+}  // namespace
+
+MotionBasis::MotionBasis(Index samples, double dt, std::vector<Window> windows) : samples_(samples), dt_(dt), windows_(std::move(windows)) {
+  for (std::size_t w = 0; w < windows_.size(); ++w) {
+    const Window& window = windows_[w];
+    if (window.stride < 1 || window.knots.first < 0 || window.knots.length() < window.stride)
+      throw std::invalid_argument("a window of the motion needs knots inside the record and a stride of at least 1");
+    const VectorXd mask = two_scale(window.stride);
+    const Index count = window.knots.length() / window.stride;
+    for (Index i = 0; i < count; ++i) columns_.push_back({window.knots.first + i * window.stride, mask, 0});
+    // The level after the window: every further coarse spline at once, a ramp of fine coefficients that ends in 1.
+    VectorXd level = VectorXd::Zero(mask.size());
+    double total = 0;
+    for (Index k = 0; k < mask.size(); ++k) {
+      for (Index j = k; j >= 0; j -= window.stride) level[k] += mask[j];
+      total = level[k];
+    }
+    columns_.push_back({window.knots.first + count * window.stride, level, total});
+  }
+}
+
+std::vector<Interval> MotionBasis::active() const {
+  std::vector<Interval> intervals;
+  for (const Window& window : windows_) {
+    const Index reach = 4 * window.stride;  // support of the last spline's jerk
+    intervals.push_back({window.knots.first, std::min(samples_, window.knots.last + reach)});
+  }
+  return intervals;
+}
+
+VectorXd MotionBasis::coefficients(const VectorXd& u) const {
+  VectorXd c = VectorXd::Zero(samples_);
+  // A level adds to all that came before; each window's knots are relative to the level they start from.
+  for (std::size_t j = 0; j < columns_.size(); ++j) {
+    const Column& column = columns_[j];
+    const double amount = u[static_cast<Index>(j)];
+    const Index inside = std::clamp<Index>(samples_ - column.first, 0, column.value.size());
+    c.segment(column.first, inside) += amount * column.value.head(inside);
+    const Index after = column.first + inside;
+    if (column.tail != 0 && after < samples_) c.tail(samples_ - after).array() += amount * column.tail;
+  }
+  return c;
+}
+
+Eigen::MatrixXd MotionBasis::angle_columns(Interval range) const {
+  Eigen::MatrixXd columns = Eigen::MatrixXd::Zero(range.length(), unknowns());
+  for (Index j = 0; j < unknowns(); ++j) {
+    const Column& column = columns_[static_cast<std::size_t>(j)];
+    const auto coefficient = [&](Index k) {
+      if (k < column.first) return 0.0;
+      return k - column.first < column.value.size() ? column.value[k - column.first] : column.tail;
+    };
+    for (Index k = std::max(range.first, column.first); k < range.last; ++k) {
+      columns(k - range.first, j) = (coefficient(k - 3) + 4 * coefficient(k - 2) + coefficient(k - 1)) / 6;
+      if (k > column.first + column.value.size() + 3) {  // constant from here on
+        columns.col(j).tail(range.last - k).setConstant(column.tail);
+        break;
+      }
+    }
+  }
+  return columns;
+}
+
+Motion motion_of(const VectorXd& c, double dt) {
+  const Index n = c.size();
+  Motion m{VectorXd(n), VectorXd(n), VectorXd(n), VectorXd(n)};
+  const auto at = [&](Index j) { return j >= 0 ? c[j] : 0.0; };
+  for (Index k = 0; k < n; ++k) {
+    m.angle[k] = (at(k - 3) + 4 * at(k - 2) + at(k - 1)) / 6;
+    m.rate[k] = (at(k - 1) - at(k - 3)) / (2 * dt);
+    m.acceleration[k] = (at(k - 1) - 2 * at(k - 2) + at(k - 3)) / (dt * dt);
+    m.jerk[k] = (at(k) - 3 * at(k - 1) + 3 * at(k - 2) - at(k - 3)) / (dt * dt * dt);
+  }
+  return m;
+}
+
+double noise_level(const VectorXd& channel, int order) {
+  std::vector<double> differences;
+  std::vector<double> binomial(static_cast<std::size_t>(order) + 1, 1);
+  for (int k = 1; k <= order; ++k) binomial[static_cast<std::size_t>(k)] = -binomial[static_cast<std::size_t>(k - 1)] * (order - k + 1) / k;
+  double gain = 0;
+  for (double b : binomial) gain += b * b;
+  std::vector<double> changes;  // between neighbours, where there is any
+  for (Index k = 0; k + order < channel.size(); ++k) {
+    double difference = 0;
+    for (int i = 0; i <= order; ++i) difference += binomial[static_cast<std::size_t>(i)] * channel[k + i];
+    if (std::isfinite(difference)) differences.push_back(std::abs(difference));
+    const double change = std::abs(channel[k + 1] - channel[k]);
+    if (change > 0) changes.push_back(change);
+  }
+  constexpr double median_to_sigma = 1.482602218505602;  // 1 / Phi^-1(3/4)
+  const double robust = median_to_sigma * median(differences);
+  // The median alone wastes two thirds of the data: mean square of all that lies within 3.5 of it, over that of a normal cut off there.
+  constexpr double cut = 3.5, cut_variance = 0.99389;
+  double sum = 0;
+  Index count = 0;
+  for (double d : differences)
+    if (d <= cut * robust) sum += d * d, ++count;
+  const double level = count > 0 ? std::sqrt(sum / static_cast<double>(count) / cut_variance / gain) : 0;
+  // The smallest change that is not a freak of the file's decimals is the quantum of a coarse converter.
+  double rounding = 0;
+  if (!changes.empty()) {
+    const auto low = changes.begin() + static_cast<std::ptrdiff_t>(changes.size() / 20);
+    std::nth_element(changes.begin(), low, changes.end());
+    rounding = *low / std::sqrt(12.0);
+  }
+  return std::max(level, rounding);
+}
+
+std::vector<bool> isolated_spikes(const VectorXd& x, double sigma, const std::vector<Interval>& motion, double limit) {
+  std::vector<bool> spike(static_cast<std::size_t>(x.size()), false);
+  const auto moves = [&](Index k) { return std::any_of(motion.begin(), motion.end(), [&](const Interval& i) { return k >= i.first && k < i.last; }); };
+  for (Index k = 0; k < x.size(); ++k)
+    spike[static_cast<std::size_t>(k)] = std::isfinite(x[k]) && !moves(k) && std::abs(x[k] - median_of_five(x, k)) > limit * sigma;
+  return spike;
+}
+
+std::vector<Interval> moving(const VectorXd& angle, double sigma) {
+  const Index n = angle.size();
+  VectorXd smooth(n);
+  for (Index k = 0; k < n; ++k) smooth[k] = median_of_five(angle, k);
+  // The median of five has a standard deviation of 0.54 sigma; differences over three samples stay below 6 sigma with all but certainty.
+  constexpr Index reach = 3, merge = 25;
+  std::vector<Interval> intervals;
+  for (Index k = reach; k + reach < n; ++k) {
+    if (!(std::abs(smooth[k + reach] - smooth[k - reach]) > 6 * sigma)) continue;
+    if (!intervals.empty() && k - intervals.back().last <= merge)
+      intervals.back().last = k + 1;
+    else
+      intervals.push_back({k, k + 1});
+  }
+  return intervals;
+}
+
+}  // namespace unrig

@@ -1,0 +1,69 @@
+#pragma once
+#include <Eigen/Core>
+#include <vector>
+
+namespace unrig {
+
+/// Samples [first, last) of a run.
+struct Interval {
+  Eigen::Index first = 0;
+  Eigen::Index last = 0;
+  Eigen::Index length() const { return last - first; }
+};
+
+/// Prescribed pitch as a uniform cubic spline with its knots on the samples, free inside a few windows and constant outside them.
+///
+/// p(t) = sum_j c_j B((t - t_j)/dt), B the cubic B-spline on [0, 4] with unit integral; p is the deviation from the angle before the first
+/// window. The fine coefficients c are few unknowns u: inside a window one per `stride` samples, after it one level until the next window:
+/// c = S u. Coarser splines (stride s > 1) are exact sums of fine ones (two-scale relation), so that the propagator only knows fine jerks.
+class MotionBasis {
+ public:
+  struct Window {
+    Interval knots;  ///< free fine knots [first, last)
+    Eigen::Index stride = 1;
+  };
+  MotionBasis(Eigen::Index samples, double dt, std::vector<Window> windows);
+
+  Eigen::Index samples() const { return samples_; }
+  Eigen::Index unknowns() const { return static_cast<Eigen::Index>(columns_.size()); }
+  const std::vector<Window>& windows() const { return windows_; }
+  /// Samples during which the jerk may differ from zero, one interval per window.
+  std::vector<Interval> active() const;
+
+  /// A column of S: fine coefficients `value` from fine knot `first` on; a level continues with `tail` to the end of the record.
+  struct Column {
+    Eigen::Index first = 0;
+    Eigen::VectorXd value;
+    double tail = 0;
+  };
+  const std::vector<Column>& columns() const { return columns_; }
+
+  Eigen::VectorXd coefficients(const Eigen::VectorXd& u) const;  ///< fine coefficients, one per sample
+  Eigen::MatrixXd angle_columns(Interval samples) const;         ///< d p / d u at these samples
+
+ private:
+  Eigen::Index samples_;
+  double dt_;
+  std::vector<Window> windows_;
+  std::vector<Column> columns_;
+};
+
+/// Angle, rate, acceleration at every sample and jerk over every step of the spline with fine coefficients c.
+struct Motion {
+  Eigen::VectorXd angle, rate, acceleration, jerk;
+};
+Motion motion_of(const Eigen::VectorXd& coefficients, double dt);
+
+/// Standard deviation of the white part of a channel: from its differences of order `order`, scaled by their gain sqrt(C(2 order, order)), cut
+/// off at 3.5 of their median so that transients and spikes do not count. A slowly varying signal is suppressed by (2 sin(omega dt/2))^order. Missing
+/// samples are left out. A channel that is quantised more coarsely than its noise returns quantum/sqrt(12).
+double noise_level(const Eigen::VectorXd& channel, int order = 6);
+
+/// Isolated electrical spikes: samples that differ from the value interpolated from two neighbours on either side by more than `limit` sigma while
+/// those neighbours agree among themselves. Returns true where a sample should be left out. Samples inside `motion` are not judged here.
+std::vector<bool> isolated_spikes(const Eigen::VectorXd& channel, double sigma, const std::vector<Interval>& motion, double limit = 6);
+
+/// Where the shaft moves: samples whose median-filtered angle changes by more than the noise allows, merged where they nearly touch.
+std::vector<Interval> moving(const Eigen::VectorXd& angle, double sigma);
+
+}  // namespace unrig

@@ -1,0 +1,34 @@
+#pragma once
+#include <Eigen/Core>
+#include <vector>
+
+#include "core/exact_step.h"
+
+namespace unrig {
+
+/// Outputs of a linear system over consecutive samples, with partials in theta, and the state behind the last of them.
+struct Response {
+  Eigen::MatrixXd output;               ///< samples x channels
+  std::vector<Eigen::MatrixXd> partial; ///< per parameter; empty where it does not act
+  DualMatrix end;                       ///< state one step after the last sample, n x 1
+};
+
+/// Which partials to carry along: all of the system's, or none (a third of the cost).
+enum class Partials { none, all };
+
+/// Free response from `start` over `samples` samples: no jerk, no inputs. Cost per sample 2 n K (1 + 2 P) for n states, K channels, P parameters:
+/// outputs come in blocks from the state at the block's first sample.
+Response coast(const LinearSystem& system, const ExactStep& step, const DualMatrix& start, Eigen::Index samples, Partials partials);
+
+/// Driven response: `jerk` one value per sample (empty: none), `input` samples + 1 rows of inputs (empty: none). Exact for cubic-spline
+/// motion and inputs linear between samples; one n x n product per sample and parameter.
+Response drive(const LinearSystem& system, const ExactStep& step, const DualMatrix& start, Eigen::Index samples, const Eigen::VectorXd& jerk,
+               const Eigen::MatrixXd& input, Partials partials);
+
+/// Rows y_k = C transition^k of the free response for every channel: K blocks of `samples` rows, n columns.
+std::vector<Eigen::MatrixXd> free_response_rows(const LinearSystem& system, const ExactStep& step, Eigen::Index samples);
+
+/// States that follow a unit cubic B-spline starting at sample 0, at samples 0..samples-1: n x samples.
+Eigen::MatrixXd spline_states(const ExactStep& step, Eigen::Index samples);
+
+}  // namespace unrig

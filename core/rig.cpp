@@ -1,0 +1,216 @@
+#include "core/rig.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <filesystem>
+#include <utility>
+
+#include "core/rig_chain.h"
+#include "core/text_file.h"
+#include "core/toml_table.h"
+#include "core/units.h"
+
+namespace unrig {
+namespace {
+
+using Eigen::Index;
+
+constexpr std::array sensor_kinds = {std::pair{"displacement", SensorKind::displacement}, std::pair{"velocity", SensorKind::velocity},
+                                     std::pair{"acceleration", SensorKind::acceleration}, std::pair{"twist", SensorKind::twist},
+                                     std::pair{"twist_rate", SensorKind::twist_rate}};
+
+void check_magic(const TomlTable& file, const std::string& path) {
+  if (!file.has("unrig_rig")) {
+    throw InputError({path, 1}, "the file does not say that it is a rig file", "wanted the line `unrig_rig = 1` at its head", "");
+  }
+  if (file.integer("unrig_rig") != 1) {
+    file.fail("unrig_rig", fmt::format("unrig_rig is {}", file.integer("unrig_rig")), "wanted 1, the only version of the format there is");
+  }
+}
+
+int element_number(const TomlTable& table, std::string_view key, Index elements) {
+  const int number = table.integer(key);
+  if (number < 1 || number > elements) {
+    table.fail(key, fmt::format("{} is {}", table.full_name(key), number), fmt::format("wanted an element from 1 to {}", elements));
+  }
+  return number;
+}
+
+// ------------------------------------------------------------------------------------------------------ structure
+
+void take_section(const TomlTable& section, Rig& rig) {
+  section.allow_only({"chord", "pitch_axis"});
+  rig.chord = section.positive_quantity("chord", "m");
+  rig.pitch_axis = section.number("pitch_axis");
+  if (rig.pitch_axis < 0 || rig.pitch_axis > 1) {
+    section.fail("pitch_axis", fmt::format("section.pitch_axis is {}", rig.pitch_axis),
+                 "wanted a fraction of the chord from 0, the leading edge, to 1, the trailing edge");
+  }
+}
+
+void take_stations(const TomlTable& normal, Rig& rig) {
+  rig.station = normal.quantities("station", "m");
+  if (rig.station.size() == 0) normal.fail("station", "normal.station has no values", "wanted one element at least");
+  double inboard = 0;
+  for (Index k = 0; k < rig.station.size(); ++k) {
+    if (!(rig.station[k] > inboard)) {
+      normal.fail("station", fmt::format("normal.station of element {} is {:.6g} m, after {:.6g} m", k + 1, rig.station[k], inboard),
+                  "wanted distances from the clamp that increase");
+    }
+    inboard = rig.station[k];
+  }
+}
+
+void take_chains(const TomlTable& file, Rig& rig) {
+  const TomlTable normal = file.table("normal");
+  const TomlTable torsion = file.table("torsion");
+  take_stations(normal, rig);
+  rig.normal = read_normal_chain(normal, rig.station, rig.warnings);
+  rig.mass_centre = normal.quantities("mass_centre", "m", rig.station.size());
+  rig.torsion = read_torsion_chain(torsion, normal, rig.warnings);
+  rig.rigid_from = element_number(torsion, "rigid_from", std::min(rig.torsion.inertia.size(), rig.station.size()));
+}
+
+void take_submerged(const TomlTable& submerged, Rig& rig) {
+  submerged.allow_only({"elements", "strip_length"});
+  rig.strip_length = submerged.positive_quantity("strip_length", "m");
+  rig.submerged = submerged.integers("elements");
+  int before = 0;
+  for (const int element : rig.submerged) {
+    if (element <= before || element > rig.station.size()) {
+      submerged.fail("elements", fmt::format("submerged.elements holds {} after {}", element, before),
+                     fmt::format("wanted increasing elements from 1 to {}", rig.station.size()));
+    }
+    before = element;
+  }
+}
+
+void take_gauge(const TomlTable& gauge, Rig& rig) {
+  gauge.allow_only({"element", "calibration_element"});
+  rig.gauge_element = element_number(gauge, "element", rig.station.size());
+  rig.calibration_element = element_number(gauge, "calibration_element", rig.station.size());
+  if (rig.calibration_element <= rig.gauge_element) {
+    gauge.fail("calibration_element",
+               fmt::format("the dead weights hung at element {}, the gauge sits at element {}", rig.calibration_element, rig.gauge_element),
+               "wanted gauge.calibration_element outboard of gauge.element", "Weights inboard of the bridge do not bend it.");
+  }
+}
+
+SensorKind sensor_kind(const TomlTable& sensor) {
+  const std::string text = sensor.text("reads");
+  for (const auto& [name, kind] : sensor_kinds) {
+    if (text == name) return kind;
+  }
+  sensor.fail("reads", fmt::format("{} is \"{}\"", sensor.full_name("reads"), text),
+              "wanted \"displacement\", \"velocity\", \"acceleration\", \"twist\" or \"twist_rate\"");
+}
+
+/// A plain number, or number and unit: "0.5 V/m" is the gain of a column in volts.
+double sensor_gain(const TomlTable& sensor) {
+  double gain = 1;
+  if (sensor.has_text("gain")) {
+    const InputError::Place place = sensor.place("gain");
+    const std::string name = sensor.full_name("gain");
+    const Measure measure = split_quantity(sensor.text("gain"), place, name);
+    gain = unit_scale(measure.unit, si_unit(measure.unit, place, name), place, name)(measure.value);
+  } else {
+    gain = sensor.number_or("gain", 1);
+  }
+  if (gain == 0) sensor.fail("gain", fmt::format("{} is 0", sensor.full_name("gain")), "wanted a gain that is not zero");
+  return gain;
+}
+
+void take_sensors(const TomlTable& file, Rig& rig) {
+  for (const TomlTable& table : file.tables("sensor")) {
+    table.allow_only({"column", "reads", "element", "gain"});
+    Sensor sensor;
+    sensor.column = table.text("column");
+    sensor.reads = sensor_kind(table);
+    const bool turns = sensor.reads == SensorKind::twist || sensor.reads == SensorKind::twist_rate;
+    sensor.element = element_number(table, "element", turns ? rig.torsion.inertia.size() : rig.station.size());
+    sensor.gain = sensor_gain(table);
+    const auto same = [&sensor](const Sensor& other) { return other.column == sensor.column; };
+    if (std::any_of(rig.sensors.begin(), rig.sensors.end(), same)) {
+      table.fail("column", fmt::format("two sensors name the column \"{}\"", sensor.column), "wanted one sensor per column");
+    }
+    rig.sensors.push_back(sensor);
+  }
+}
+
+void take_structure(const TomlTable& file, Rig& rig) {
+  file.allow_only({"unrig_rig", "name", "section", "normal", "torsion", "submerged", "gauge", "sensor"});
+  take_section(file.table("section"), rig);
+  take_chains(file, rig);
+  take_submerged(file.table("submerged"), rig);
+  if (file.has("gauge")) take_gauge(file.table("gauge"), rig);
+  if (file.has("sensor")) take_sensors(file, rig);
+  if (rig.gauge_element == 0 && rig.sensors.empty()) {
+    throw InputError({rig.file, 0}, "the rig has neither [gauge] nor [[sensor]]", "wanted something that measures", "");
+  }
+}
+
+// ------------------------------------------------------------------------------------------------------ modes only
+
+/// "1000 N/m": what the gauge reads per metre of modal displacement. The unit of the reading is the gain's times metre.
+void take_gauge_gain(const TomlTable& table, ModalMode& mode) {
+  const InputError::Place place = table.place("gauge_gain");
+  const std::string name = table.full_name("gauge_gain");
+  const Measure gain = split_quantity(table.text("gauge_gain"), place, name);
+  si_unit(gain.unit, place, name);  // so that an unknown unit is reported as it stands in the file
+  const std::string reading = fmt::format("({}).(m)", gain.unit);
+  mode.gauge_unit = si_unit(reading, place, name);
+  mode.gauge_gain = unit_scale(reading, mode.gauge_unit, place, name)(gain.value);
+  if (mode.gauge_gain == 0) table.fail("gauge_gain", fmt::format("{} is 0", name), "wanted a gain that is not zero");
+}
+
+ModalMode read_mode(const TomlTable& table) {
+  table.allow_only({"mass", "frequency", "damping_ratio", "gauge_gain"});
+  ModalMode mode;
+  mode.mass = table.positive_quantity("mass", "kg");
+  mode.frequency = table.positive_quantity("frequency", "Hz");
+  mode.damping_ratio = table.number("damping_ratio");
+  if (mode.damping_ratio < 0 || mode.damping_ratio >= 1) {
+    table.fail("damping_ratio", fmt::format("{} is {}", table.full_name("damping_ratio"), mode.damping_ratio),
+               "wanted a fraction of critical damping, at least 0 and below 1");
+  }
+  take_gauge_gain(table, mode);
+  return mode;
+}
+
+void take_modes(const TomlTable& file, Rig& rig) {
+  for (const char* key : {"section", "normal", "torsion", "submerged", "gauge", "sensor"}) {
+    if (file.has(key)) {
+      file.fail(key, fmt::format("[{}] stands beside [[modal]]", key), "wanted either a rig of elements or a rig known only as modes");
+    }
+  }
+  file.allow_only({"unrig_rig", "name", "modal"});
+  for (const TomlTable& table : file.tables("modal")) {
+    rig.modal.push_back(read_mode(table));
+    if (rig.modal.back().gauge_unit != rig.modal.front().gauge_unit) {
+      table.fail(
+          "gauge_gain",
+          fmt::format("the gauge reads {} for this mode and {} for the first", rig.modal.back().gauge_unit, rig.modal.front().gauge_unit),
+          "wanted one unit of the reading");
+    }
+  }
+}
+
+}  // namespace
+
+Rig read_rig(const std::string& path) {
+  const TomlTable file = TomlTable::parse(read_text(path), path, "Text stands in double quotes, a remark begins with #.");
+  check_magic(file, path);
+  Rig rig;
+  rig.file = path;
+  rig.name = file.text_or("name", std::filesystem::path(path).stem().string());
+  if (file.has("modal")) {
+    take_modes(file, rig);
+  } else {
+    take_structure(file, rig);
+  }
+  return rig;
+}
+
+}  // namespace unrig

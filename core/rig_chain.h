@@ -1,0 +1,17 @@
+#pragma once
+#include <Eigen/Core>
+#include <string>
+#include <vector>
+
+#include "core/rig.h"
+#include "core/toml_table.h"
+
+namespace unrig {
+
+/// Reads the table [normal] but for `station` and `mass_centre`. Keys and errors: core/rig.h, read_rig.
+Chain read_normal_chain(const TomlTable& normal, const Eigen::VectorXd& station, std::vector<std::string>& warnings);
+
+/// Reads the table [torsion] but for `rigid_from`. Elements take station and length from `normal` where the table has none.
+Chain read_torsion_chain(const TomlTable& torsion, const TomlTable& normal, std::vector<std::string>& warnings);
+
+}  // namespace unrig

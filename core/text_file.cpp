@@ -1,0 +1,171 @@
+#include "core/text_file.h"
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <atomic>
+#include <cerrno>
+#include <cstring>
+#include <filesystem>
+#include <optional>
+#include <string_view>
+#include <utility>
+
+#include "core/error.h"
+
+namespace unrig {
+namespace {
+
+namespace fs = std::filesystem;
+
+std::string reason() { return std::strerror(errno); }
+
+[[noreturn]] void refuse_write(const std::string& path, const std::string& why) {
+  throw InputError({path, 0}, "the file cannot be written: " + why, "wanted a path that can be written", "");
+}
+
+/// An open file that closes itself, so that every way out is clean.
+class OpenFile {
+ public:
+  OpenFile(const std::string& path, int flags, mode_t mode = 0) : number_(::open(path.c_str(), flags | O_CLOEXEC, mode)) {}
+  ~OpenFile() {
+    if (number_ >= 0) ::close(number_);
+  }
+  OpenFile(const OpenFile&) = delete;
+  OpenFile& operator=(const OpenFile&) = delete;
+
+  bool is_open() const { return number_ >= 0; }
+  int number() const { return number_; }
+  /// False with errno where the system could not keep what was written.
+  bool close() { return ::close(std::exchange(number_, -1)) == 0; }
+
+ private:
+  int number_;
+};
+
+std::optional<struct stat> status(const std::string& path) {
+  struct stat found {};
+  if (::stat(path.c_str(), &found) != 0) return std::nullopt;
+  return found;
+}
+
+bool write_all(int file, std::string_view text) {
+  while (!text.empty()) {
+    const ssize_t written = ::write(file, text.data(), text.size());
+    if (written < 0 && errno == EINTR) continue;
+    if (written < 0) return false;
+    text.remove_prefix(static_cast<std::size_t>(written));
+  }
+  return true;
+}
+
+/// Pipes and devices cannot be renamed over, and keep no half-written file either.
+void write_directly(const std::string& path, const std::string& text) {
+  OpenFile file(path, O_WRONLY | O_APPEND);
+  if (!file.is_open() || !write_all(file.number(), text) || !file.close()) refuse_write(path, reason());
+}
+
+/// The file that `path` means: the end of a chain of symbolic links, which stay as they are.
+fs::path followed(const std::string& path) {
+  fs::path target = path;
+  std::error_code failure;
+  for (int links = 0; fs::is_symlink(target, failure); ++links) {
+    if (links == 40) refuse_write(path, std::strerror(ELOOP));
+    const fs::path next = fs::read_symlink(target, failure);
+    if (failure) refuse_write(path, failure.message());
+    target = target.parent_path() / next;  // an absolute `next` replaces the left side
+  }
+  return target;
+}
+
+/// A new file beside the target, gone again unless it is renamed over the target.
+class TemporaryFile {
+ public:
+  TemporaryFile(const fs::path& target, mode_t mode)
+      : target_(target), path_(unused_name(target)), file_(path_, O_WRONLY | O_CREAT | O_EXCL, mode) {
+    created_ = file_.is_open();
+  }
+  ~TemporaryFile() {
+    if (created_) ::unlink(path_.c_str());
+  }
+  TemporaryFile(const TemporaryFile&) = delete;
+  TemporaryFile& operator=(const TemporaryFile&) = delete;
+
+  /// False with errno where a step fails. fsync comes before the rename: a crash leaves the old file or the whole new one.
+  bool replace_target_with(std::string_view text) {
+    if (!created_ || !write_all(file_.number(), text) || ::fsync(file_.number()) != 0 || !file_.close()) return false;
+    if (::rename(path_.c_str(), target_.c_str()) != 0) return false;
+    created_ = false;
+    return true;
+  }
+  bool take_mode(mode_t mode) const { return created_ && ::fchmod(file_.number(), mode & 07777) == 0; }
+
+ private:
+  /// Short, so that a target whose name is as long as the system allows can still be written.
+  static std::string unused_name(const fs::path& target) {
+    static std::atomic<int> count = 0;
+    fs::path name;
+    std::error_code ignored;  // the opening of the file reports what is wrong with the directory
+    do {
+      name = target.parent_path() / fmt::format(".unrig-{}-{}.tmp", ::getpid(), ++count);
+    } while (fs::exists(fs::symlink_status(name, ignored)));
+    return name.string();
+  }
+
+  fs::path target_;
+  std::string path_;
+  OpenFile file_;
+  bool created_ = false;
+};
+
+/// The rename itself lives in the directory; where a file system cannot flush directories the file is written all the same.
+void flush_directory(const fs::path& directory) {
+  const OpenFile opened(directory.empty() ? "." : directory.string(), O_RDONLY | O_DIRECTORY);
+  if (opened.is_open()) ::fsync(opened.number());
+}
+
+}  // namespace
+
+std::string read_text(const std::string& path) {
+  const auto refuse = [&path](const std::string& why) {
+    throw InputError({path, 0}, "the file cannot be read: " + why, "wanted a readable text file", "");
+  };
+  const OpenFile file(path, O_RDONLY);
+  if (!file.is_open()) refuse(reason());
+  std::string text;
+  const auto found = status(path);
+  const std::size_t block = 1 << 16;
+  std::size_t size = 0;
+  // One byte beyond the expected size lets the last read see the end of the file. Pipes have no size and grow the text instead.
+  text.resize(found && found->st_size > 0 ? static_cast<std::size_t>(found->st_size) + 1 : block);
+  while (true) {
+    if (size == text.size()) text.resize(2 * size);
+    const ssize_t got = ::read(file.number(), text.data() + size, text.size() - size);
+    if (got < 0 && errno == EINTR) continue;
+    if (got < 0) refuse(reason());
+    if (got == 0) break;
+    size += static_cast<std::size_t>(got);
+  }
+  text.resize(size);
+  return text;
+}
+
+void write_text(const std::string& path, const std::string& text) {
+  const auto old = status(path);
+  if (old && S_ISDIR(old->st_mode)) refuse_write(path, std::strerror(EISDIR));
+  // /dev/stdout may lead to a regular file: whoever opened it goes on writing to it, so it must not be replaced.
+  const bool descriptor = path.starts_with("/dev/") || path.starts_with("/proc/");
+  if (old && (!S_ISREG(old->st_mode) || descriptor)) return write_directly(path, text);
+  // A rename would step over the write protection of the old file.
+  if (old && ::access(path.c_str(), W_OK) != 0) refuse_write(path, reason());
+
+  const fs::path target = followed(path);
+  TemporaryFile temporary(target, 0666);
+  if (old && !temporary.take_mode(old->st_mode)) refuse_write(path, reason());
+  if (!temporary.replace_target_with(text)) refuse_write(path, reason());
+  flush_directory(target.parent_path());
+}
+
+}  // namespace unrig

@@ -1,0 +1,43 @@
+#pragma once
+#include <Eigen/Core>
+#include <string>
+#include <vector>
+
+#include "core/csv_table.h"
+
+namespace unrig {
+
+/// The uniform times t_k = start + k step that stand for the stamps of a recording.
+struct TimeGrid {
+  double start = 0;
+  double step = 0;
+  double largest_jitter = 0;      ///< largest distance of a stamp from its place on the grid
+  bool resample = false;          ///< true where that is more than the rounding of printed stamps
+  Eigen::VectorXd stamps;         ///< the stamps, repeated ones spread; empty unless `resample`
+  std::vector<int> spread_lines;  ///< lines of the file whose repeated stamps were spread
+};
+
+/// Judges the stamps of `table`'s column `time`; everything is in that column's own unit.
+///
+/// The grid runs from the first stamp to the last with as many samples as the file has.
+/// - Stamps within 1e-3 steps of it are on it, and so are stamps printed with few digits: within one unit of the last digit of it, with
+///   intervals that differ by no more than that, which is no more than half a step. Nothing is resampled.
+/// - Other stamps jitter: the channels are to be interpolated.
+/// - A gap is an InputError with its place: an interval of more than 1.5 steps (median or mean, the shorter) that none of the next five
+/// stamps
+///   makes up. In a recording whose intervals jitter throughout (median deviation from the step above 1e-3 steps and the last printed
+///   digit) the limit is 5 steps.
+/// - Data loggers stamp a sample late and the next at the same instant. A run of equal stamps is spread evenly over the time since the
+/// stamp
+///   before, if that leaves at least half a step each.
+///
+/// Every other stamp that does not increase, a missing one, and fewer than three rows are InputErrors.
+TimeGrid time_grid(const CsvTable& table, const CsvColumn& time);
+
+/// Linear interpolation of `value`, given at `stamps`, to the grid. A neighbour that is missing makes the sample missing.
+Eigen::VectorXd interpolated(const Eigen::VectorXd& value, const TimeGrid& grid);
+
+/// Interpolation of weights: a sample that takes part of its value from one that is left out (weight 0) is left out itself.
+Eigen::VectorXd interpolated_weight(const Eigen::VectorXd& weight, const TimeGrid& grid);
+
+}  // namespace unrig

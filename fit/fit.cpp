@@ -1,0 +1,350 @@
+#include "fit/fit.h"
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+
+#include <fmt/format.h>
+
+#include "fit/joint_problem.h"
+
+namespace unrig {
+namespace {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+using Windows = std::vector<std::vector<MotionBasis::Window>>;
+
+void tell(const FitProblem& problem, const std::string& what) {
+  if (problem.progress) problem.progress(what);
+}
+
+JointProblem make_joint(const AeroelasticModel& model, const std::vector<Run>& runs, const Windows& windows, Index horizon) {
+  std::vector<RunResidual> residuals;
+  for (std::size_t r = 0; r < runs.size(); ++r) residuals.emplace_back(model, runs[r], windows[r], RunOptions{horizon});
+  return JointProblem(model, std::move(residuals));
+}
+
+/// Continues `next` from the values of `last`.
+void carry_over(const JointProblem& last, JointProblem& next) {
+  for (std::size_t i = 0; i < next.unknowns().size(); ++i) {
+    next.unknowns()[i].value = last.unknowns()[i].value;
+    next.unknowns()[i].held = last.unknowns()[i].held;
+    next.unknowns()[i].why_held = last.unknowns()[i].why_held;
+  }
+}
+
+/// Unknowns that no run responds to, or only through a combination of others, are held where they are. Of a degenerate set the masses go first:
+/// a free decay fixes stiffness and damping per mass, and the mass of a structure is what is best known from drawings.
+void hold_undetermined(JointProblem& joint) {
+  const MatrixXd jacobian = joint.linearise().jacobian;
+  std::vector<Index> order(joint.unknowns().size());
+  for (std::size_t i = 0; i < order.size(); ++i) order[i] = static_cast<Index>(i);
+  const auto last_resort = [&](Index i) {
+    const std::string& name = joint.parameter(joint.unknowns()[static_cast<std::size_t>(i)]).name;
+    return name.ends_with(".mass") ? 1 : 0;
+  };
+  std::stable_sort(order.begin(), order.end(), [&](Index a, Index b) { return last_resort(a) < last_resort(b); });
+
+  constexpr double dependent = 1e-6;  // sine of the angle to the span of the others; exact derivatives leave 1e-10 where it is truly zero
+  std::vector<VectorXd> span;
+  for (Index i : order) {
+    VectorXd rest = jacobian.col(i);
+    const double length = rest.norm();
+    for (int pass = 0; pass < 2; ++pass)
+      for (const VectorXd& direction : span) rest -= direction.dot(rest) * direction;
+    Unknown& unknown = joint.unknowns()[static_cast<std::size_t>(i)];
+    unknown.held = !(length > 0) || rest.norm() < dependent * length;
+    if (unknown.held) unknown.why_held = length > 0 ? "These runs determine it only together with others" : "These runs do not respond to it";
+    if (!unknown.held) span.push_back(rest.normalized());
+  }
+}
+
+void solve(JointProblem& joint, FitResult& result, const JointProblem::SolveOptions& options = {}) {
+  const JointProblem::Summary summary = joint.solve(options);
+  result.evaluations += summary.evaluations;
+  result.converged = summary.converged;
+  result.message = summary.message;
+}
+
+/// From the rig file's values to the whole record by way of windows that grow from a few periods.
+JointProblem arrive(const AeroelasticModel& model, const FitProblem& problem, const Windows& windows, FitResult& result) {
+  Index longest = 0;
+  for (const Run& run : problem.runs) longest = std::max(longest, run.samples());
+  constexpr Index shortest = 40, growth = 4;
+  std::vector<Index> horizons{0};
+  for (Index horizon = longest / growth; horizon >= shortest; horizon /= growth) horizons.insert(horizons.begin(), horizon);
+
+  JointProblem joint = make_joint(model, problem.runs, windows, horizons.front());
+  hold_undetermined(joint);
+  for (std::size_t stage = 0; stage < horizons.size(); ++stage) {
+    if (stage > 0) {
+      JointProblem longer = make_joint(model, problem.runs, windows, horizons[stage]);
+      carry_over(joint, longer);
+      joint = std::move(longer);
+    }
+    const bool whole = horizons[stage] == 0;
+    tell(problem, whole ? "fitting the whole record" : fmt::format("fitting the first {} samples", horizons[stage]));
+    JointProblem::SolveOptions options;
+    options.prior = !whole;
+    options.tolerance = whole ? 1e-7 : 1e-2;
+    options.iterations = whole ? 50 : 12;
+    solve(joint, result, options);
+  }
+  return joint;
+}
+
+/// Widens a window of the motion where the gauge still sees the shaft move beyond it: chi-square must fall by clearly more than the knots added.
+bool widen_motion(JointProblem& joint, const std::vector<Run>& runs, Windows& windows) {
+  bool widened = false;
+  for (std::size_t r = 0; r < runs.size(); ++r) {
+    for (std::size_t w = 0; w < windows[r].size(); ++w) {
+      const Interval knots = windows[r][w].knots;
+      const Index more = std::max<Index>(10, knots.length() / 4);
+      for (const bool later : {true, false}) {
+        std::vector<MotionBasis::Window> trial = windows[r];
+        Interval& k = trial[w].knots;
+        if (later)
+          k.last = std::min(w + 1 < trial.size() ? trial[w + 1].knots.first - 5 : runs[r].samples() - 5, k.last + more);
+        else
+          k.first = std::max<Index>(w > 0 ? trial[w - 1].knots.last + 5 : 0, k.first - more);
+        const auto added = static_cast<double>(k.length() - windows[r][w].knots.length());
+        if (added <= 0) continue;
+        RunResidual wider(joint.model(), runs[r], trial);
+        const VectorXd theta = joint.theta(r);
+        wider.reject_spikes(theta);
+        const double before = joint.runs()[r].evaluate(theta, Partials::none).chi2;
+        const double scale = std::max(1.0, before / static_cast<double>(joint.runs()[r].degrees_of_freedom()));
+        const double gain = (before - wider.evaluate(theta, Partials::none).chi2) / scale;
+        if (gain < added + 4 * std::sqrt(2 * added)) continue;  // four standard deviations of chi-square with that many degrees
+        windows[r] = trial;
+        joint.runs()[r] = std::move(wider);
+        widened = true;
+      }
+    }
+  }
+  return widened;
+}
+
+void refine_motion(JointProblem& joint, const FitProblem& problem, Windows& windows, FitResult& result) {
+  constexpr int rounds = 6;
+  for (int round = 0; round < rounds; ++round) {
+    Index rejected = 0;
+    for (std::size_t r = 0; r < joint.runs().size(); ++r) rejected += joint.runs()[r].reject_spikes(joint.theta(r));
+    if (!widen_motion(joint, problem.runs, windows) && rejected == 0 && round > 0) break;
+    tell(problem, "refining the motion");
+    solve(joint, result);
+  }
+}
+
+/// Covariance of the unknowns that are not held, in the order of `free`, at a reduced chi-square of one.
+struct Covariance {
+  std::vector<Index> free;
+  MatrixXd matrix;
+};
+
+Covariance covariance(const JointProblem& joint) {
+  const MatrixXd all = joint.linearise().jacobian;
+  Covariance c;
+  for (std::size_t i = 0; i < joint.unknowns().size(); ++i)
+    if (!joint.unknowns()[i].held) c.free.push_back(static_cast<Index>(i));
+  const auto count = static_cast<Index>(c.free.size());
+  MatrixXd jacobian(all.rows(), count);
+  for (Index i = 0; i < count; ++i) jacobian.col(i) = all.col(c.free[static_cast<std::size_t>(i)]);
+  const VectorXd scale = jacobian.colwise().norm().transpose().cwiseMax(1e-300).cwiseInverse();
+  const MatrixXd scaled = jacobian * scale.asDiagonal();
+  c.matrix = scale.asDiagonal() * (scaled.transpose() * scaled).ldlt().solve(MatrixXd::Identity(count, count)) * scale.asDiagonal();
+  return c;
+}
+
+/// A standard error as large as this says nothing that was not known before: half of itself, for a damping ratio 0.2.
+double ignorance(const Parameter& p, double value) {
+  return p.name.ends_with("damping_ratio") ? 0.2 : 0.5 * std::max(std::abs(p.start), std::abs(value));
+}
+
+/// Unknowns that the data hardly touch go back to the rig file's value and are held there, so that they cannot bend the others.
+bool hold_weak(JointProblem& joint, double inflation) {
+  const Covariance c = covariance(joint);
+  bool held = false;
+  for (std::size_t a = 0; a < c.free.size(); ++a) {
+    Unknown& u = joint.unknowns()[static_cast<std::size_t>(c.free[a])];
+    const double error = inflation * std::sqrt(c.matrix(static_cast<Index>(a), static_cast<Index>(a)));
+    if (error < ignorance(joint.parameter(u), u.value)) continue;
+    u.value = joint.parameter(u).start;
+    u.held = held = true;
+    u.why_held = fmt::format("These runs hardly respond to it (one standard deviation would be {:.2g})", error);
+  }
+  return held;
+}
+
+/// Noise, motion, and what the data cannot determine: each looked at again once the model fits.
+void settle(JointProblem& joint, const FitProblem& problem, Windows& windows, FitResult& result) {
+  for (RunResidual& run : joint.runs()) {
+    const std::size_t r = static_cast<std::size_t>(&run - joint.runs().data());
+    run.settle_noise(joint.theta(r));
+  }
+  refine_motion(joint, problem, windows, result);
+  double freedom = 0;
+  for (const RunResidual& run : joint.runs()) freedom += static_cast<double>(run.degrees_of_freedom());
+  if (hold_weak(joint, std::sqrt(std::max(1.0, joint.chi2() / freedom)))) solve(joint, result);
+}
+
+double rms(const VectorXd& x, const VectorXd& weight) {
+  double sum = 0;
+  Index count = 0;
+  for (Index k = 0; k < x.size(); ++k)
+    if (weight[k] > 0) sum += x[k] * x[k], ++count;
+  return count > 0 ? std::sqrt(sum / static_cast<double>(count)) : 0;
+}
+
+FittedRun describe_run(const RunResidual& residual, const VectorXd& theta, double chi2) {
+  const Run& run = residual.run();
+  const RunResidual::Prediction p = residual.predict(theta);
+  FittedRun fitted;
+  fitted.file = run.file;
+  fitted.samples = run.samples();
+  fitted.chi2 = chi2;
+  fitted.degrees_of_freedom = residual.degrees_of_freedom();
+  const auto add = [&](const std::string& name, const VectorXd& model, const VectorXd& weight, double noise) {
+    const Channel& channel = run.channel(name);
+    FittedChannel c;
+    c.name = name;
+    c.unit = channel.unit;
+    c.missing = channel.missing;
+    c.samples = (weight.array() > 0).count();
+    c.rms_residual = rms(channel.value - model, weight);
+    c.noise = noise;
+    fitted.channels.push_back(c);
+  };
+  for (std::size_t c = 0; c < p.channels.size(); ++c)
+    add(p.channels[c], p.output.col(static_cast<Index>(c)), residual.channel_weight(c), residual.sigma(c));
+  if (p.motion.angle.size() > 0) {
+    add("alpha", p.motion.angle.array() + p.angle_offset[0], residual.angle_weight(), residual.angle_sigma());
+    fitted.channels.back().spikes = residual.spikes();
+  }
+  return fitted;
+}
+
+/// Steady load before the motion as a coefficient: the constant part of the gauge over what a unit coefficient on all strips would read.
+/// The gauge's own zero cannot be told from it.
+void add_steady_load(const RunResidual& residual, const VectorXd& theta, FitResult& result) {
+  const Rig& rig = residual.model().rig();
+  const Conditions& c = residual.conditions();
+  if (rig.is_modal() || rig.gauge_element == 0 || c.speed == 0 || residual.channels().front() != "gauge") return;
+  const double gauge = rig.station[rig.gauge_element - 1], lever = rig.station[rig.calibration_element - 1] - gauge;
+  double unit_reading = 0;
+  for (int element : rig.submerged)
+    unit_reading += c.density * c.speed * c.speed * rig.semichord() * rig.strip_length * std::max(0.0, rig.station[element - 1] - gauge) / lever;
+  const RunResidual::Prediction p = residual.predict(theta);
+  FittedParameter steady;
+  steady.name = "steady_normal_force";
+  steady.unit = "1";
+  steady.run = residual.run().file;
+  steady.value = p.offset[0] / unit_reading;
+  const Index column = p.linear.size() - 1 - static_cast<Index>(residual.channels().size()) + (residual.motion().unknowns() > 0 ? 0 : 1);
+  const VectorXd unit = VectorXd::Unit(p.linear.size(), column);
+  const VectorXd half = p.linear_factor.triangularView<Eigen::Upper>().transpose().solve(unit);
+  steady.std_error = half.norm() / unit_reading;
+  steady.start = 0;
+  result.parameters.push_back(steady);
+}
+
+std::string what_to_record(const std::string& name) {
+  if (name == "apparent_mass_coefficient") return "Record a free decay in the fluid besides one in air.";
+  if (name == "normal_force_slope") return "Record a step of the angle at this speed.";
+  if (name == "torsion.stiffness_scale" || name == "torsion.damping_ratio") return "Record a run that excites torsion: a rapid step, or a pluck off the pitch axis.";
+  if (name.ends_with(".mass")) return "Record a run with a measured force: a free decay fixes stiffness and damping only per mass.";
+  if (name.ends_with(".mount_participation")) return "Record a run with the mount moving.";
+  return "Record a free decay.";
+}
+
+/// Standard errors and correlations of all unknowns that were not held.
+void describe_parameters(const JointProblem& joint, FitResult& result) {
+  const Covariance c = covariance(joint);
+  const double inflation = std::sqrt(std::max(1.0, result.reduced_chi2()));
+  const auto all = static_cast<Index>(joint.unknowns().size()), count = static_cast<Index>(c.free.size());
+  result.correlation = MatrixXd::Identity(all, all);
+  for (Index a = 0; a < count; ++a)
+    for (Index b = 0; b < count; ++b)
+      result.correlation(c.free[static_cast<std::size_t>(a)], c.free[static_cast<std::size_t>(b)]) = c.matrix(a, b) / std::sqrt(c.matrix(a, a) * c.matrix(b, b));
+
+  for (Index i = 0; i < all; ++i) {
+    const Unknown& u = joint.unknowns()[static_cast<std::size_t>(i)];
+    const Parameter& p = joint.parameter(u);
+    FittedParameter fitted;
+    fitted.name = p.name;
+    fitted.unit = p.unit;
+    fitted.run = u.run >= 0 ? joint.runs()[static_cast<std::size_t>(u.run)].run().file : "";
+    fitted.value = u.value;
+    fitted.start = p.start;
+    fitted.std_error = std::nan("");
+    const auto position = std::find(c.free.begin(), c.free.end(), i);
+    if (position == c.free.end()) {
+      fitted.identified = false;
+      fitted.advice = u.why_held + "; held at the rig file's value. " + what_to_record(p.name);
+    } else {
+      const Index a = position - c.free.begin();
+      fitted.std_error = inflation * std::sqrt(c.matrix(a, a));
+      if (u.value <= p.lower || u.value >= p.upper) {
+        fitted.identified = false;
+        fitted.advice = fmt::format("It ended at its bound {}. ", u.value) + what_to_record(p.name);
+      }
+    }
+    result.parameters.push_back(fitted);
+  }
+}
+
+}  // namespace
+
+double FitResult::bic() const { return chi2 + std::log(static_cast<double>(observations)) * static_cast<double>(variables); }
+
+AeroelasticModel model_of(const Rig& rig, const std::vector<Run>& runs, Wagner circulation) {
+  if (rig.is_modal()) return {rig, {}, wagner(circulation)};
+  Basis basis;
+  for (const Run& run : runs) {
+    Basis wanted = make_basis(rig, 0.5 / run.dt, run.density);
+    if (wanted.size() > basis.size()) basis = std::move(wanted);
+  }
+  return {rig, basis, wagner(circulation)};
+}
+
+FitResult fit(const FitProblem& problem) {
+  const auto begin = std::chrono::steady_clock::now();
+  FitResult result;
+  result.rig_file = problem.rig.file;
+  result.circulation = problem.circulation;
+  result.warnings = problem.rig.warnings;
+  const AeroelasticModel model = model_of(problem.rig, problem.runs, problem.circulation);
+  result.normal_modes = model.basis().normal_modes;
+  result.torsion_modes = model.basis().torsion_modes;
+
+  Windows windows;
+  for (const Run& run : problem.runs) {
+    windows.push_back(problem.rig.is_modal() ? std::vector<MotionBasis::Window>{} : motion_windows(run));
+    for (const std::string& warning : run.warnings) result.warnings.push_back(warning);
+  }
+  JointProblem joint = arrive(model, problem, windows, result);
+  hold_undetermined(joint);
+  settle(joint, problem, windows, result);
+
+  const JointProblem::Linearisation lin = joint.linearise();
+  result.chi2 = lin.chi2();
+  for (const Unknown& u : joint.unknowns()) result.variables += u.held ? 0 : 1;
+  for (std::size_t r = 0; r < joint.runs().size(); ++r) {
+    result.observations += joint.runs()[r].observations();
+    result.variables += joint.runs()[r].linear_unknowns();
+    result.runs.push_back(describe_run(joint.runs()[r], joint.theta(r), lin.run_chi2[r]));
+  }
+  describe_parameters(joint, result);
+  for (std::size_t r = 0; r < joint.runs().size(); ++r) add_steady_load(joint.runs()[r], joint.theta(r), result);
+  const auto all = static_cast<Index>(result.parameters.size()), known = result.correlation.rows();
+  result.correlation.conservativeResizeLike(MatrixXd::Identity(all, all));
+  result.correlation.block(0, known, known, all - known).setZero();
+  result.correlation.block(known, 0, all - known, known).setZero();
+  result.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+  return result;
+}
+
+}  // namespace unrig

@@ -1,0 +1,85 @@
+#pragma once
+#include <Eigen/Core>
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "core/aeroelastic_model.h"
+#include "core/rig.h"
+#include "core/run.h"
+#include "core/wagner.h"
+
+namespace unrig {
+
+/// Which rig explains these recordings? All runs share stiffness, damping and apparent mass; every run has its own normal-force slope, steady
+/// load, motion and initial state.
+struct FitProblem {
+  Rig rig;
+  std::vector<Run> runs;
+  Wagner circulation = Wagner::within_1e4;
+  std::function<void(const std::string&)> progress;  ///< told what is being done; empty: silent
+};
+
+struct FittedParameter {
+  std::string name;
+  std::string unit;
+  std::string run;        ///< file of the run it belongs to; empty where all share it
+  double value = 0;
+  double std_error = 0;   ///< one standard deviation; NaN where it could not be had
+  double start = 0;
+  bool identified = true;
+  std::string advice;     ///< where not identified: why, and what to record
+};
+
+struct FittedChannel {
+  std::string name;
+  std::string unit;
+  Eigen::Index samples = 0;  ///< that counted
+  std::size_t missing = 0;   ///< without a reading in the file
+  Eigen::Index spikes = 0;   ///< left out as electrical spikes
+  double rms_residual = 0;
+  double noise = 0;          ///< standard deviation of the channel's white part, estimated from its differences
+};
+
+struct FittedRun {
+  std::string file;
+  Eigen::Index samples = 0;
+  double chi2 = 0;
+  Eigen::Index degrees_of_freedom = 0;
+  std::vector<FittedChannel> channels;  ///< the fitted outputs, then `alpha` where the motion was estimated
+  double reduced_chi2() const { return chi2 / static_cast<double>(degrees_of_freedom); }
+};
+
+struct FitResult {
+  bool converged = false;
+  std::string message;
+  double chi2 = 0;
+  Eigen::Index observations = 0;
+  Eigen::Index variables = 0;  ///< nonlinear and linear unknowns together
+  int evaluations = 0;         ///< of the joint model with its derivatives
+  double seconds = 0;
+  std::vector<FittedParameter> parameters;
+  Eigen::MatrixXd correlation;  ///< of `parameters`; zero beside the diagonal for those that were held
+  std::vector<FittedRun> runs;
+  std::string rig_file;
+  Wagner circulation = Wagner::within_1e4;
+  Eigen::Index normal_modes = 0, torsion_modes = 0;
+  std::vector<std::string> warnings;
+
+  double reduced_chi2() const { return chi2 / static_cast<double>(observations - variables); }
+  double aic() const { return chi2 + 2 * static_cast<double>(variables); }
+  double bic() const;
+};
+
+/// Joint least-squares fit (Ceres, Levenberg-Marquardt). The residuals are divided by each channel's own noise level; motion, initial states, steady loads
+/// and offsets are eliminated exactly in every step (RunResidual). The fitted window grows from a few periods to the whole record, because
+/// a resonance that is off by a tenth has slipped whole cycles after ten.
+///
+/// Standard errors: inverse Gauss-Newton Hessian, times the reduced chi-square where that exceeds one.
+/// Throws InputError where a run does not belong to the rig.
+FitResult fit(const FitProblem& problem);
+
+/// The model of a set of runs: one basis, rich enough for all of them.
+AeroelasticModel model_of(const Rig& rig, const std::vector<Run>& runs, Wagner circulation);
+
+}  // namespace unrig

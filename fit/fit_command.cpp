@@ -1,0 +1,52 @@
+#include "fit/fit_command.h"
+
+#include <CLI/CLI.hpp>
+#include <fmt/format.h>
+
+#include "core/command.h"
+#include "core/text_file.h"
+#include "fit/fit.h"
+#include "fit/fit_files.h"
+
+namespace unrig {
+
+int fit_command(int argc, char** argv) {
+  CLI::App app{"Fits stiffness, damping and apparent mass of a rig to recordings, all together.", "unrig fit"};
+  std::string rig_path, output, circulation = "1e-4";
+  std::vector<std::string> run_paths;
+  double least = 0.1;
+  app.add_option("--rig", rig_path, "rig file (TOML)")->required();
+  app.add_option("runs", run_paths, "run files (CSV): free decays and steps of this rig, in any number")->required();
+  app.add_option("-o,--output", output, "result (JSON)")->required();
+  app.add_option("--wagner", circulation, "circulatory build-up: 1e-4, 1e-6 (largest error), jones, seed")->capture_default_str();
+  app.add_option("--correlations", least, "smallest correlation to report")->capture_default_str();
+  app.footer("Example:\n  unrig fit --rig rig.toml dry_pluck.csv wet_pluck.csv step_a.csv -o fit.json");
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& e) {
+    return app.exit(e) == 0 ? exit_done : exit_wrong_use;
+  }
+
+  FitProblem problem;
+  problem.rig = read_rig(rig_path);
+  try {
+    problem.circulation = wagner_from_name(circulation);
+  } catch (const std::invalid_argument& e) {
+    throw InputError({"--wagner", 0}, e.what(), "wanted one of the names above", "");
+  }
+  for (const std::string& path : run_paths) problem.runs.push_back(read_run(path));
+  Progress progress;
+  problem.progress = [&](const std::string& what) { progress(what); };
+  const FitResult result = fit(problem);
+  progress.clear();
+  for (const std::string& warning : result.warnings) warn(warning);
+  write_text(output, to_json(result));
+  fmt::print("{}", report(result, least));
+  if (!result.converged) {
+    warn("the fit did not converge: " + result.message);
+    return exit_no_answer;
+  }
+  return exit_done;
+}
+
+}  // namespace unrig

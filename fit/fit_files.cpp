@@ -1,0 +1,192 @@
+#include "fit/fit_files.h"
+
+#include <cmath>
+#include <filesystem>
+
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+
+#include "core/text_file.h"
+
+namespace unrig {
+namespace {
+
+using nlohmann::json;
+
+constexpr std::pair<Wagner, const char*> circulation_names[] = {
+    {Wagner::within_1e4, "1e-4"}, {Wagner::within_1e6, "1e-6"}, {Wagner::jones, "jones"}, {Wagner::seed, "seed"}};
+
+const char* name_of(Wagner which) {
+  for (const auto& [value, name] : circulation_names)
+    if (value == which) return name;
+  return "";
+}
+
+/// JSON knows no NaN.
+json number(double x) { return std::isfinite(x) ? json(x) : json(nullptr); }
+
+std::string base_name(const std::string& path) { return std::filesystem::path(path).filename().string(); }
+
+std::string label(const FittedParameter& p) { return p.run.empty() ? p.name : p.name + " (" + base_name(p.run) + ")"; }
+
+}  // namespace
+
+std::string to_json(const FitResult& r) {
+  json out;
+  out["unrig"] = "fit";
+  out["rig"] = r.rig_file;
+  out["converged"] = r.converged;
+  out["message"] = r.message;
+  out["reduced_chi2"] = number(r.reduced_chi2());
+  out["chi2"] = number(r.chi2);
+  out["observations"] = r.observations;
+  out["variables"] = r.variables;
+  out["aic"] = number(r.aic());
+  out["bic"] = number(r.bic());
+  out["circulation"] = name_of(r.circulation);
+  out["modes"] = {{"normal", r.normal_modes}, {"torsion", r.torsion_modes}};
+  out["parameters"] = json::array();
+  for (const FittedParameter& p : r.parameters) {
+    json item = {{"name", p.name},   {"value", number(p.value)}, {"std_error", number(p.std_error)},
+                 {"unit", p.unit},   {"identified", p.identified}, {"start", number(p.start)}};
+    if (!p.run.empty()) item["run"] = p.run;
+    if (!p.advice.empty()) item["advice"] = p.advice;
+    out["parameters"].push_back(item);
+  }
+  out["correlation"] = json::array();
+  for (Eigen::Index i = 0; i < r.correlation.rows(); ++i) {
+    json row = json::array();
+    for (Eigen::Index j = 0; j < r.correlation.cols(); ++j) row.push_back(number(r.correlation(i, j)));
+    out["correlation"].push_back(row);
+  }
+  out["runs"] = json::array();
+  for (const FittedRun& run : r.runs) {
+    json channels = json::array();
+    for (const FittedChannel& c : run.channels)
+      channels.push_back({{"name", c.name}, {"unit", c.unit}, {"samples", c.samples}, {"missing", c.missing}, {"spikes", c.spikes},
+                          {"rms_residual", number(c.rms_residual)}, {"noise", number(c.noise)}});
+    const FittedChannel& first = run.channels.front();
+    out["runs"].push_back({{"file", run.file}, {"samples", run.samples}, {"rms_residual", number(first.rms_residual)}, {"noise", number(first.noise)},
+                           {"unit", first.unit}, {"reduced_chi2", number(run.reduced_chi2())}, {"channels", channels}});
+  }
+  out["warnings"] = r.warnings;
+  return out.dump(2) + "\n";
+}
+
+FittedRig read_fit(const std::string& path) {
+  const auto refuse = [&](const std::string& found) -> InputError { return {{path, 0}, found, "wanted a fit.json written by `unrig fit`", "Give the file that `unrig fit -o` wrote."}; };
+  const json in = json::parse(read_text(path), nullptr, false);
+  if (in.is_discarded()) throw refuse("not valid JSON");
+  if (!in.is_object() || in.value("unrig", "") != "fit") throw refuse("no key \"unrig\" with the value \"fit\"");
+  try {
+    FittedRig fit;
+    fit.file = path;
+    const std::string circulation = in.value("circulation", "1e-4");
+    fit.circulation = wagner_from_name(circulation);
+    if (in.contains("modes")) {
+      fit.normal_modes = in["modes"].value("normal", 0);
+      fit.torsion_modes = in["modes"].value("torsion", 0);
+    }
+    for (const json& item : in.at("parameters")) {
+      FittedParameter p;
+      p.name = item.at("name").get<std::string>();
+      p.unit = item.value("unit", "");
+      p.run = item.value("run", "");
+      p.value = item.at("value").get<double>();
+      p.std_error = item.at("std_error").is_number() ? item.at("std_error").get<double>() : std::nan("");
+      p.identified = item.value("identified", true);
+      fit.parameters.push_back(p);
+    }
+    const auto n = static_cast<Eigen::Index>(fit.parameters.size());
+    fit.correlation = Eigen::MatrixXd::Identity(n, n);
+    if (in.contains("correlation")) {
+      const json& rows = in["correlation"];
+      if (rows.size() != fit.parameters.size()) throw refuse(fmt::format("{} parameters but a correlation matrix of {} rows", n, rows.size()));
+      for (Eigen::Index i = 0; i < n; ++i)
+        for (Eigen::Index j = 0; j < n; ++j) fit.correlation(i, j) = rows.at(static_cast<std::size_t>(i)).at(static_cast<std::size_t>(j)).get<double>();
+    }
+    for (const json& run : in.value("runs", json::array())) fit.runs.push_back(run.value("file", ""));
+    return fit;
+  } catch (const json::exception& e) {
+    throw refuse(e.what());
+  } catch (const std::invalid_argument& e) {
+    throw refuse(e.what());
+  }
+}
+
+const FittedParameter* FittedRig::find(const std::string& name, const std::string& run_file) const {
+  for (const FittedParameter& p : parameters)
+    if (p.name == name && (p.run.empty() || base_name(p.run) == base_name(run_file))) return &p;
+  return nullptr;
+}
+
+double FittedRig::value(const std::string& name, const std::string& run_file, double missing) const {
+  const FittedParameter* p = find(name, run_file);
+  return p ? p->value : missing;
+}
+
+Eigen::VectorXd theta_for(const AeroelasticModel& model, const FittedRig& fit, const std::string& run_file) {
+  Eigen::VectorXd theta = model.start_values();
+  for (std::size_t j = 0; j < model.parameters().size(); ++j) {
+    const Parameter& p = model.parameters()[j];
+    double& value = theta[static_cast<Eigen::Index>(j)];
+    if (const FittedParameter* fitted = fit.find(p.name, run_file)) {
+      value = fitted->value;
+      continue;
+    }
+    double sum = 0;
+    int count = 0;
+    for (const FittedParameter& other : fit.parameters)
+      if (other.name == p.name) sum += other.value, ++count;
+    if (count > 0) value = sum / count;
+  }
+  return theta;
+}
+
+std::string report(const FitResult& r, double least) {
+  std::string text = "[[Fit Statistics]]\n";
+  const auto line = [&](const char* name, const std::string& value) { text += fmt::format("    {:<18} = {}\n", name, value); };
+  line("# fitting method", "Levenberg-Marquardt (Ceres), linear unknowns eliminated");
+  line("# function evals", fmt::format("{}", r.evaluations));
+  line("# data points", fmt::format("{}", r.observations));
+  line("# variables", fmt::format("{}", r.variables));
+  line("chi-square", fmt::format("{:.4f}", r.chi2));
+  line("reduced chi-square", fmt::format("{:.5f}", r.reduced_chi2()));
+  line("Akaike info crit", fmt::format("{:.2f}", r.aic()));
+  line("Bayesian info crit", fmt::format("{:.2f}", r.bic()));
+  if (!r.converged) text += "    NOT CONVERGED: " + r.message + "\n";
+
+  std::size_t width = 0;
+  for (const FittedParameter& p : r.parameters) width = std::max(width, label(p).size());
+  text += "[[Variables]]\n";
+  for (const FittedParameter& p : r.parameters) {
+    const std::string unit = p.unit == "1" ? "" : " " + p.unit;
+    if (std::isfinite(p.std_error))
+      text += fmt::format("    {:<{}} {: .7g} +/- {:.3g}{} ({:.2f}%) (init = {:.6g}){}\n", label(p) + ":", width + 1, p.value, p.std_error, unit,
+                          100 * std::abs(p.std_error / p.value), p.start, p.identified ? "" : " NOT IDENTIFIED");
+    else
+      text += fmt::format("    {:<{}} {: .7g}{} (fixed)\n", label(p) + ":", width + 1, p.value, unit);
+    if (!p.advice.empty()) text += fmt::format("    {:<{}}  {}\n", "", width + 1, p.advice);
+  }
+
+  std::vector<std::tuple<double, std::string>> pairs;
+  for (Eigen::Index i = 0; i < r.correlation.rows(); ++i)
+    for (Eigen::Index j = i + 1; j < r.correlation.cols(); ++j)
+      if (std::abs(r.correlation(i, j)) >= least)
+        pairs.emplace_back(-std::abs(r.correlation(i, j)), fmt::format("    C({}, {}) = {:+.4f}\n", label(r.parameters[static_cast<std::size_t>(i)]),
+                                                                       label(r.parameters[static_cast<std::size_t>(j)]), r.correlation(i, j)));
+  std::sort(pairs.begin(), pairs.end());
+  text += fmt::format("[[Correlations]] (unreported correlations are < {:.3f})\n", least);
+  for (const auto& [strength, what] : pairs) text += what;
+
+  text += "[[Runs]]\n";
+  for (const FittedRun& run : r.runs) {
+    text += fmt::format("    {}: {} samples, reduced chi-square {:.3f}\n", base_name(run.file), run.samples, run.reduced_chi2());
+    for (const FittedChannel& c : run.channels)
+      text += fmt::format("        {:<6} residual {:.4g} {}, noise {:.4g} {}{}{}\n", c.name, c.rms_residual, c.unit, c.noise, c.unit,
+                          c.missing ? fmt::format(", {} missing", c.missing) : "", c.spikes ? fmt::format(", {} spikes left out", c.spikes) : "");
+  }
+  return text;
+}
+
+}  // namespace unrig

@@ -1,0 +1,35 @@
+#pragma once
+#include <string>
+
+#include "fit/fit.h"
+
+namespace unrig {
+
+/// `fit.json` (formats.md, section 4), with the circulation, the modes kept and the full correlation matrix.
+std::string to_json(const FitResult& result);
+
+/// Parameters of a `fit.json`, as far as `simulate` and `correct` need them.
+struct FittedRig {
+  std::string file;
+  Wagner circulation = Wagner::within_1e4;
+  Eigen::Index normal_modes = 0, torsion_modes = 0;
+  std::vector<FittedParameter> parameters;
+  Eigen::MatrixXd correlation;
+  std::vector<std::string> runs;
+
+  /// The value of a parameter, of this run (by file name without folders) where it has its own; `missing` where there is none.
+  double value(const std::string& name, const std::string& run_file, double missing) const;
+  const FittedParameter* find(const std::string& name, const std::string& run_file) const;
+};
+
+/// Throws InputError where the file is not a fit.
+FittedRig read_fit(const std::string& path);
+
+/// theta of `model` for a run: the fit's values, and the model's start values for what the fit does not name. For a run that was not fitted
+/// the slope is the mean over the fitted runs that have one.
+Eigen::VectorXd theta_for(const AeroelasticModel& model, const FittedRig& fit, const std::string& run_file);
+
+/// Text report: statistics, variables with error, percentage and start value, correlations of at least `least`, runs.
+std::string report(const FitResult& result, double least = 0.1);
+
+}  // namespace unrig

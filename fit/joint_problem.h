@@ -1,0 +1,68 @@
+#pragma once
+#include <Eigen/Core>
+#include <string>
+#include <vector>
+
+#include "core/aeroelastic_model.h"
+#include "fit/run_residual.h"
+
+namespace unrig {
+
+/// An unknown of a joint fit: a model parameter, shared or of one run.
+struct Unknown {
+  Eigen::Index parameter = 0;  ///< index into AeroelasticModel::parameters
+  int run = -1;                ///< -1: shared by all runs
+  double value = 0;
+  bool held = false;
+  std::string why_held;  ///< for the person who reads the report
+};
+
+/// Several runs of one rig, and the unknowns they share.
+class JointProblem {
+ public:
+  /// Unknowns at the model's start values: every shared parameter, and per run those that can act in it.
+  JointProblem(const AeroelasticModel& model, std::vector<RunResidual> runs);
+
+  const AeroelasticModel& model() const { return *model_; }
+  std::vector<RunResidual>& runs() { return runs_; }
+  const std::vector<RunResidual>& runs() const { return runs_; }
+  std::vector<Unknown>& unknowns() { return unknowns_; }
+  const std::vector<Unknown>& unknowns() const { return unknowns_; }
+  const Parameter& parameter(const Unknown& unknown) const { return model_->parameters()[static_cast<std::size_t>(unknown.parameter)]; }
+
+  /// The model's theta for one run.
+  Eigen::VectorXd theta(std::size_t run) const;
+
+  struct SolveOptions {
+    bool prior = false;   ///< hold unknowns weakly near their present values, while a short window determines only some of them
+    int iterations = 30;
+    double tolerance = 1e-7;  ///< relative change of chi-square at which the search ends
+  };
+  struct Summary {
+    bool converged = false;
+    double chi2 = 0;
+    int evaluations = 0;
+    std::string message;
+  };
+  /// Levenberg-Marquardt on all unknowns that are not held.
+  Summary solve(const SolveOptions& options);
+
+  /// Residual and Jacobian of all runs at the present values, one column per unknown (held ones too).
+  struct Linearisation {
+    Eigen::VectorXd residual;
+    Eigen::MatrixXd jacobian;
+    std::vector<double> run_chi2;
+    double chi2() const;
+  };
+  Linearisation linearise() const;
+
+  /// chi-square at the present values.
+  double chi2() const;
+
+ private:
+  const AeroelasticModel* model_;
+  std::vector<RunResidual> runs_;
+  std::vector<Unknown> unknowns_;
+};
+
+}  // namespace unrig

@@ -1,0 +1,115 @@
+#pragma once
+#include <Eigen/Core>
+#include <string>
+#include <vector>
+
+#include "core/aeroelastic_model.h"
+#include "core/motion.h"
+#include "core/response.h"
+#include "core/run.h"
+
+namespace unrig {
+
+/// How a run is held against the model.
+struct RunOptions {
+  Eigen::Index horizon = 0;  ///< samples after the onset (first motion, else the first sample) that count; 0: all of them
+};
+
+/// One run against the model: residuals of all fitted channels in units of their own noise, with everything that enters linearly solved for.
+///
+/// Linear unknowns c: motion (spline knots), initial state (free decays, forced and moved runs), a zero offset per channel (steady load
+/// included), and the angle before the motion. Both the angle and the gauge are measured: sum over channels of
+/// ((y_measured - y(theta, c)) / sigma)^2 is least over c for every theta (variable projection, Golub and Pereyra 1973), so that a nonlinear solver
+/// sees only theta.
+///
+/// Long stretches without jerk are compressed exactly: their rows span only the free response of the model, an n-dimensional space.
+class RunResidual {
+ public:
+  /// `motion`: windows in which the shaft may move (empty for runs without prescribed pitch).
+  RunResidual(const AeroelasticModel& model, const Run& run, std::vector<MotionBasis::Window> motion, RunOptions options = {});
+
+  /// At theta: P + 1 numbers whose squares sum to the least chi-square, and their derivative. Kaufman's Jacobian: its gradient is that of
+  /// chi-square exactly, and J^T J is the Gauss-Newton Hessian with c eliminated.
+  struct Evaluation {
+    double chi2 = 0;
+    Eigen::VectorXd residual;  ///< P + 1
+    Eigen::MatrixXd jacobian;  ///< (P + 1) x P, empty for Partials::none
+    Eigen::VectorXd linear;    ///< c
+  };
+  Evaluation evaluate(const Eigen::VectorXd& theta, Partials partials) const;
+
+  /// The fitted channels over the whole record, at theta and the c that belongs to it.
+  struct Prediction {
+    std::vector<std::string> channels;
+    Eigen::MatrixXd output;        ///< samples x channels, offsets included
+    Eigen::VectorXd angle_offset;  ///< the angle before the motion (1 number; empty without motion)
+    Motion motion;                 ///< deviation from it; empty without prescribed pitch
+    Eigen::VectorXd offset;        ///< per channel
+    Eigen::VectorXd initial_state; ///< empty where steady
+    Eigen::VectorXd linear;        ///< c
+    Eigen::MatrixXd linear_factor; ///< R with R^T R = information matrix of c at fixed theta
+  };
+  Prediction predict(const Eigen::VectorXd& theta) const;
+
+  const Run& run() const { return *run_; }
+  const AeroelasticModel& model() const { return *model_; }
+  const Conditions& conditions() const { return conditions_; }
+  const MotionBasis& motion() const { return motion_; }
+  const std::vector<std::string>& channels() const { return channels_; }
+  double sigma(std::size_t channel) const { return sigma_[channel]; }
+  double angle_sigma() const { return angle_sigma_; }
+  /// Samples with a weight, over all channels and the angle, minus linear unknowns.
+  Eigen::Index degrees_of_freedom() const;
+  Eigen::Index observations() const;
+  Eigen::Index linear_unknowns() const { return unknowns_; }
+  /// Angle samples left out as spikes.
+  Eigen::Index spikes() const { return spikes_; }
+
+  /// Leaves out angle samples that lie more than `limit` sigma from the fitted motion, alone or in pairs: three in a row are no electrical spike but
+  /// a motion that the model forces away from the measured one. Returns how many were newly left out.
+  Eigen::Index reject_spikes(const Eigen::VectorXd& theta, double limit = 5);
+
+  /// Takes the noise of each channel from what the model at theta leaves of it, where that is less: differences of the raw channel keep some of
+  /// a fast signal. Differences of third order still do not see a slow mismatch.
+  void settle_noise(const Eigen::VectorXd& theta);
+
+  Eigen::VectorXd channel_weight(std::size_t channel) const { return weight_.col(static_cast<Eigen::Index>(channel)); }
+  const Eigen::VectorXd& angle_weight() const { return angle_weight_; }
+
+ private:
+  struct Segment {
+    Interval samples;
+    bool moving;
+  };
+  struct Linearised;
+  Linearised linearise(const Eigen::VectorXd& theta, Partials partials) const;
+  Eigen::MatrixXd solve_rows(const Linearised& lin) const;
+  Eigen::MatrixXd motion_state_columns(const Eigen::MatrixXd& states, const Eigen::MatrixXd& summed, Eigen::Index sample) const;
+  Eigen::MatrixXd motion_output_columns(const Linearised& lin, Eigen::Index channel, const Interval& samples) const;
+  void prepare_angle_rows();
+
+  const AeroelasticModel* model_;
+  const Run* run_;
+  Conditions conditions_;
+  std::vector<std::string> channels_;
+  MotionBasis motion_;
+  std::vector<Segment> segments_;
+  Eigen::MatrixXd measured_;  ///< samples x channels, missing samples 0
+  Eigen::MatrixXd weight_;    ///< 1 / sigma, 0 where left out
+  std::vector<double> sigma_;
+  Eigen::VectorXd angle_, angle_weight_;
+  double angle_sigma_ = 0;
+  std::vector<Eigen::MatrixXd> angle_rows_;  ///< [c | angle], weighted; they do not depend on theta
+  Eigen::MatrixXd inputs_;  ///< samples + 1 rows
+  Eigen::Index spikes_ = 0;
+  Eigen::Index last_sample_ = 0;
+
+  // Layout of c.
+  Eigen::Index free_states_ = 0, unknowns_ = 0;
+  Eigen::Index first_state_ = 0, first_offset_ = 0, angle_offset_ = -1;
+};
+
+/// Windows in which the shaft of a run moves, from its angle channel, with room before and after; empty for runs without prescribed pitch.
+std::vector<MotionBasis::Window> motion_windows(const Run& run);
+
+}  // namespace unrig

@@ -1,0 +1,140 @@
+#include "core/text_file.h"
+
+#include <fcntl.h>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <filesystem>
+#include <string>
+#include <thread>
+
+#include "core/error.h"
+#include "tests/support/temporary_directory.h"
+
+namespace unrig {
+namespace {
+
+namespace fs = std::filesystem;
+using test::TemporaryDirectory;
+using ::testing::AllOf;
+using ::testing::HasSubstr;
+
+std::size_t files_in(const fs::path& directory) {
+  return static_cast<std::size_t>(std::distance(fs::directory_iterator(directory), fs::directory_iterator()));
+}
+
+std::string refusal(const std::string& path) {
+  try {
+    write_text(path, "new");
+  } catch (const InputError& error) {
+    return error.what();
+  }
+  return "no error";
+}
+
+TEST(TextFile, WritesWhatItReads) {
+  const TemporaryDirectory directory;
+  std::string text = "a\r\n\xC2\xB5 no end of line";
+  text.push_back('\0');
+  text.append(200000, 'x');  // more than one block of a pipe or buffer
+  write_text(directory.path("a.txt"), text);
+  EXPECT_EQ(read_text(directory.path("a.txt")), text);
+  write_text(directory.path("a.txt"), "");
+  EXPECT_EQ(read_text(directory.path("a.txt")), "");
+}
+
+TEST(TextFile, ReadingWhatIsNotThereNamesPathAndReason) {
+  const TemporaryDirectory directory;
+  try {
+    read_text(directory.path("none.csv"));
+    FAIL() << "no error";
+  } catch (const InputError& error) {
+    EXPECT_THAT(error.what(), AllOf(HasSubstr("none.csv: "), HasSubstr("No such file")));
+  }
+  EXPECT_THROW(read_text(directory.path("")), InputError) << "a directory";
+}
+
+TEST(TextFile, LeavesNoTemporaryFileBehind) {
+  const TemporaryDirectory directory;
+  write_text(directory.path("a.txt"), "one");
+  write_text(directory.path("a.txt"), "two");
+  EXPECT_EQ(files_in(directory.path("")), 1u);
+}
+
+TEST(TextFile, RefusesADirectoryAndLeavesItAlone) {
+  const TemporaryDirectory directory;
+  fs::create_directory(directory.path("results"));
+  EXPECT_THAT(refusal(directory.path("results")), HasSubstr("directory"));
+  EXPECT_TRUE(fs::is_directory(directory.path("results")));
+  EXPECT_EQ(files_in(directory.path("")), 1u);
+}
+
+TEST(TextFile, RefusesADirectoryThatIsNotThere) {
+  const TemporaryDirectory directory;
+  EXPECT_THAT(refusal(directory.path("none/a.txt")), HasSubstr("No such file"));
+}
+
+TEST(TextFile, KeepsPermissionsOfTheOldFile) {
+  const TemporaryDirectory directory;
+  const std::string path = directory.file("a.txt", "old");
+  fs::permissions(path, fs::perms(0640));
+  write_text(path, "new");
+  EXPECT_EQ(fs::status(path).permissions(), fs::perms(0640));
+}
+
+TEST(TextFile, WritesThroughSymbolicLinks) {
+  const TemporaryDirectory directory;
+  directory.file("real.txt", "old");
+  fs::create_symlink("real.txt", directory.path("link.txt"));
+  write_text(directory.path("link.txt"), "new");
+  EXPECT_TRUE(fs::is_symlink(directory.path("link.txt")));
+  EXPECT_EQ(read_text(directory.path("real.txt")), "new");
+
+  fs::create_symlink("later.txt", directory.path("dangling.txt"));
+  write_text(directory.path("dangling.txt"), "new");
+  EXPECT_TRUE(fs::is_symlink(directory.path("dangling.txt")));
+  EXPECT_EQ(read_text(directory.path("later.txt")), "new");
+
+  fs::create_symlink("loop.txt", directory.path("loop.txt"));
+  EXPECT_THAT(refusal(directory.path("loop.txt")), HasSubstr("symbolic links"));
+}
+
+TEST(TextFile, WritesDirectlyToAPipe) {
+  const TemporaryDirectory directory;
+  const std::string path = directory.path("pipe");
+  ASSERT_EQ(::mkfifo(path.c_str(), 0600), 0);
+  std::string received;
+  std::thread reader([&] { received = read_text(path); });
+  const std::string sent(200000, 'x');
+  write_text(path, sent);
+  reader.join();
+  EXPECT_EQ(received, sent);
+  EXPECT_TRUE(fs::is_fifo(path));
+}
+
+TEST(TextFile, WritesDirectlyToADevice) {
+  write_text("/dev/null", "gone");
+  EXPECT_TRUE(fs::is_character_file("/dev/null"));
+}
+
+TEST(TextFile, AFullDeviceIsAnError) {
+  if (!fs::exists("/dev/full")) GTEST_SKIP() << "the system has no /dev/full";
+  EXPECT_THAT(refusal("/dev/full"), HasSubstr("space"));
+}
+
+TEST(TextFile, ANameAsLongAsTheSystemAllows) {
+  const TemporaryDirectory directory;
+  const std::string path = directory.path(std::string(255, 'n'));
+  write_text(path, "new");
+  EXPECT_EQ(read_text(path), "new");
+}
+
+TEST(InputErrorMessage, HasOneShape) {
+  EXPECT_STREQ(InputError({"a.csv", 3}, "found", "wanted", "Advice.").what(), "a.csv:3: found; wanted. Advice.");
+  EXPECT_STREQ(InputError({"a.csv", 0}, "found", "wanted", "").what(), "a.csv: found; wanted.");
+}
+
+}  // namespace
+}  // namespace unrig
