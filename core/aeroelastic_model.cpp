@@ -165,13 +165,15 @@ Eigen::VectorXd coupled_frequencies(const Rig& rig, const Basis& basis, double d
   return eigen.eigenvalues().cwiseSqrt() / (2 * pi);
 }
 
-AeroelasticModel::AeroelasticModel(Rig rig, Basis basis, IndicialFunction circulation)
-    : rig_(std::move(rig)), basis_(std::move(basis)), circulation_(std::move(circulation)) {
+AeroelasticModel::AeroelasticModel(Rig rig, Basis basis, IndicialFunction circulation, Circulation build_up)
+    : rig_(std::move(rig)), basis_(std::move(basis)), circulation_(std::move(circulation)), build_up_(build_up) {
   // Bounds are what a rig can be, wide: they keep a search physical, they are not prior knowledge.
   if (!rig_.is_modal()) {
     parameters_ = {{"normal.stiffness_scale", "1", 1, 1e-3, 1e3, false},       {"torsion.stiffness_scale", "1", 1, 1e-3, 1e3, false},
                    {"normal.damping_ratio", "1", 0.01, 0, 0.9, false},         {"torsion.damping_ratio", "1", 0.02, 0, 0.9, false},
                    {"apparent_mass_coefficient", "1", 1, 0, 10, false},        {"normal_force_slope", "1/rad", 2 * pi, -20, 50, true}};
+    for (Index k = 0; build_up_ == Circulation::free && k < circulation_.amplitude.size(); ++k)
+      parameters_.push_back({fmt::format("circulation.amplitude[{}]", k + 1), "1", circulation_.amplitude[k], -10, 10, true});
     return;
   }
   for (std::size_t i = 0; i < rig_.modal.size(); ++i) {
@@ -195,6 +197,12 @@ Index AeroelasticModel::index(const std::string& name) const {
   for (std::size_t j = 0; j < parameters_.size(); ++j)
     if (parameters_[j].name == name) return static_cast<Index>(j);
   throw std::out_of_range(fmt::format("the model of rig '{}' has no parameter '{}'", rig_.name, name));
+}
+
+Index AeroelasticModel::circulation_parameter(Index k) const { return build_up_ == Circulation::free ? beam_parameter_count + k : -1; }
+
+double AeroelasticModel::circulation_amplitude(const VectorXd& theta, Index k) const {
+  return build_up_ == Circulation::free ? theta[beam_parameter_count + k] : circulation_.amplitude[k];
 }
 
 std::vector<std::string> AeroelasticModel::output_channels(const Run& run) const {
@@ -238,12 +246,16 @@ LinearSystem AeroelasticModel::beam_system(const Conditions& conditions, const V
   downwash.add_rate((0.5 - rig_.axis()) * b * strips.twist - strips.normal);
   Rows circulatory = rows(strip_count);
   if (U > 0) {
-    MatrixXd built_up = (1 - circulation_.amplitude.sum()) * downwash.dual.value;
-    for (Index term = 0; term < terms; ++term)
-      built_up.middleCols(2 * n + term * strip_count, strip_count).diagonal().array() += circulation_.amplitude[term];
-    const MatrixXd per_slope = conditions.density * U * b * rig_.strip_length * built_up;
-    circulatory.dual.value = slope * per_slope;
-    circulatory.dual.add_partial(force_slope, per_slope);
+    const double strength = conditions.density * U * b * rig_.strip_length;
+    MatrixXd built_up = downwash.dual.value;
+    for (Index term = 0; term < terms; ++term) {  // amplitude (y - w): what is still missing of w
+      MatrixXd missing = -downwash.dual.value;
+      missing.middleCols(2 * n + term * strip_count, strip_count).diagonal().array() += 1;
+      built_up += circulation_amplitude(theta, term) * missing;
+      if (const Index parameter = circulation_parameter(term); parameter >= 0) circulatory.dual.add_partial(parameter, slope * strength * missing);
+    }
+    circulatory.dual.value = slope * strength * built_up;
+    circulatory.dual.add_partial(force_slope, strength * built_up);
   }
 
   // Generalised forces on the modal coordinates (Eq. 3.9, 3.16).

@@ -70,8 +70,11 @@ struct LinearSystem {
 /// A rig that is known only as modes: m q'' + c q' + k q = force - g acceleration of the mount, gauge = sum of gain times q.
 class AeroelasticModel {
  public:
+  /// Whether the build-up of circulation is a given function, or its amplitudes are parameters ("circulation.amplitude[k]", the rates stay).
+  enum class Circulation { given, free };
+
   /// Beam rigs need a basis; modal rigs ignore it.
-  AeroelasticModel(Rig rig, Basis basis, IndicialFunction circulation);
+  AeroelasticModel(Rig rig, Basis basis, IndicialFunction circulation, Circulation build_up = Circulation::given);
 
   const Rig& rig() const { return rig_; }
   const Basis& basis() const { return basis_; }
@@ -81,6 +84,10 @@ class AeroelasticModel {
   Eigen::VectorXd start_values() const;
   /// Index of a parameter; throws std::out_of_range naming it.
   Eigen::Index index(const std::string& name) const;
+
+  /// Amplitude k of the build-up of circulation at theta, and the parameter that it is (-1: given).
+  double circulation_amplitude(const Eigen::VectorXd& theta, Eigen::Index k) const;
+  Eigen::Index circulation_parameter(Eigen::Index k) const;
 
   /// The linear system at theta. `channels`: which outputs are wanted ("gauge" and sensor columns).
   LinearSystem system(const Conditions& conditions, const Eigen::VectorXd& theta, const std::vector<std::string>& channels) const;
@@ -95,6 +102,7 @@ class AeroelasticModel {
   Rig rig_;
   Basis basis_;
   IndicialFunction circulation_;
+  Circulation build_up_;
   std::vector<Parameter> parameters_;
 };
 

@@ -22,9 +22,8 @@ inline constexpr double printed_rounding = 5e-4;
 ///
 /// Throws InputError, naming the elements, where
 /// - a diagonal entry is not positive: no load may move its own point backwards;
-/// - entries across the diagonal differ by more than 1 % of sqrt(A_ii A_jj) and, if measured, by more than three standard deviations:
-/// Maxwell's
-///   reciprocity;
+/// - entries across the diagonal differ by more than 1 % of sqrt(A_ii A_jj) and, if measured, by more than three standard deviations,
+///   against Maxwell's reciprocity;
 /// - the matrix is not positive definite within the rounding of its entries: no load may do negative work.
 ///
 /// The last is judged on S_ij = A_ij / sqrt(A_ii A_jj), so that stiff and soft elements count alike. |S_ij| <= 1, so rounding (or

@@ -10,10 +10,10 @@ namespace unrig {
 
 /// A chain of lumped elements, clamped at its first end (seed, section 3.1): normal displacement or twist.
 struct Chain {
-  Eigen::VectorXd inertia;      ///< mass per element [kg], or moment of inertia about the pitch axis [kg m^2]
-  Eigen::MatrixXd flexibility;  ///< A_ij: deflection of i per unit load at j [m/N or rad/(N m)] (seed, Eq. 3.2), symmetrised
+  Eigen::VectorXd inertia;          ///< mass per element [kg], or moment of inertia about the pitch axis [kg m^2]
+  Eigen::MatrixXd flexibility;      ///< A_ij: deflection of i per unit load at j [m/N or rad/(N m)] (seed, Eq. 3.2), symmetrised
   Eigen::MatrixXd flexibility_std;  ///< standard deviation of a measured flexibility, empty where none is given
-  int modes = 0;                ///< modes to keep; 0 = all below the run's Nyquist frequency
+  int modes = 0;                    ///< modes to keep; 0 = all below the run's Nyquist frequency
 };
 
 /// What a further channel measures (formats.md, section 3).
@@ -21,17 +21,17 @@ enum class SensorKind { displacement, velocity, acceleration, twist, twist_rate 
 struct Sensor {
   std::string column;
   SensorKind reads = SensorKind::displacement;
-  int element = 1;   ///< from 1, in the normal chain, or in the torsion chain for twist and twist_rate
-  double gain = 1;   ///< column (SI) per unit of the model's quantity (SI)
+  int element = 1;  ///< from 1, in the normal chain, or in the torsion chain for twist and twist_rate
+  double gain = 1;  ///< column (SI) per unit of the model's quantity (SI)
 };
 
 /// One mode of a rig that is known only as modes.
 struct ModalMode {
-  double mass = 1;           ///< kg
-  double frequency = 0;      ///< Hz, in vacuum
+  double mass = 1;       ///< kg
+  double frequency = 0;  ///< Hz, in vacuum
   double damping_ratio = 0;
-  double gauge_gain = 1;     ///< gauge reading per metre of modal displacement, SI
-  std::string gauge_unit;    ///< SI unit of the reading ("N", "rad", "N.m")
+  double gauge_gain = 1;   ///< gauge reading per metre of modal displacement, SI
+  std::string gauge_unit;  ///< SI unit of the reading ("N", "rad", "N.m")
 };
 
 /// A structure, in SI (formats.md, section 3). Either `modal` is filled, or the two chains and what belongs to them.
@@ -39,17 +39,17 @@ struct Rig {
   std::string file;
   std::string name;
 
-  double chord = 0;       ///< m
-  double pitch_axis = 0;  ///< fraction of the chord aft of the leading edge
+  double chord = 0;             ///< m
+  double pitch_axis = 0;        ///< fraction of the chord aft of the leading edge
   Eigen::VectorXd station;      ///< m from the clamp, one per normal element
   Eigen::VectorXd mass_centre;  ///< m aft of the pitch axis, one per normal element
   Chain normal;
   Chain torsion;
-  int rigid_from = 0;  ///< torsion element (from 1) that carries the normal elements of the same number and all outboard
-  std::vector<int> submerged;  ///< normal elements (from 1) that are strips
-  double strip_length = 0;     ///< m
-  int gauge_element = 0;       ///< from 1; 0: the rig has no gauge
-  int calibration_element = 0; ///< from 1
+  int rigid_from = 0;           ///< torsion element (from 1) that carries the normal elements of the same number and all outboard
+  std::vector<int> submerged;   ///< normal elements (from 1) that are strips
+  double strip_length = 0;      ///< m
+  int gauge_element = 0;        ///< from 1; 0: the rig has no gauge
+  int calibration_element = 0;  ///< from 1
 
   std::vector<Sensor> sensors;
   std::vector<ModalMode> modal;
@@ -61,8 +61,9 @@ struct Rig {
   double axis() const { return 2 * pitch_axis - 1; }
 };
 
-/// Reads a rig file (formats.md, section 3). Throws InputError (file, line, key, found, wanted) for unknown keys, wrong units, mismatched lengths,
-/// elements out of range, and a flexibility matrix that is not symmetric or not positive definite within the rounding of its printed digits.
+/// Reads a rig file (formats.md, section 3). Throws InputError (file, line, key, found, wanted) for unknown keys, wrong units, mismatched
+/// lengths, elements out of range, and a flexibility matrix that is not symmetric or not positive definite within the rounding of its
+/// printed digits.
 ///
 /// Beyond formats.md it understands:
 ///

@@ -15,12 +15,12 @@ std::string to_string(RunKind kind);
 
 /// One measured column of a run on the uniform time grid, in SI. Missing samples are NaN.
 struct Channel {
-  std::string name;        ///< as in the header
-  std::string file_unit;   ///< as in the header
-  std::string unit;        ///< SI unit of `value` (after calibration)
-  double factor = 1;       ///< SI per file unit (calibration included)
+  std::string name;       ///< as in the header
+  std::string file_unit;  ///< as in the header
+  std::string unit;       ///< SI unit of `value` (after calibration)
+  double factor = 1;      ///< SI per file unit (calibration included)
   Eigen::VectorXd value;
-  std::size_t missing = 0; ///< samples without a number in the file
+  std::size_t missing = 0;  ///< samples without a number in the file
 };
 
 /// One recording: the file's meta data and its columns on a uniform grid t_k = start + k dt.
@@ -32,10 +32,10 @@ struct Run {
   std::string name;
   RunKind kind = RunKind::step;
   std::string medium;
-  double density = 0;  ///< kg/m^3
-  double speed = 0;    ///< m/s
-  double start = 0;    ///< s
-  double dt = 0;       ///< s
+  double density = 0;         ///< kg/m^3
+  double speed = 0;           ///< m/s
+  double start = 0;           ///< s
+  double dt = 0;              ///< s
   bool resampled = false;     ///< true where the file's times jitter and the channels were interpolated to the uniform grid
   double largest_jitter = 0;  ///< s
   std::vector<Channel> channels;
@@ -50,15 +50,16 @@ struct Run {
 
 /// Reads a run file (formats.md, section 2).
 ///
-/// Times that are printed roughly stay on their uniform grid; times that jitter have every channel interpolated linearly to it, and `resampled`
-/// says so; a gap of more than 1.5 steps, or 5 where times jitter throughout, is an error with its place (core/time_grid.h has the rules).
+/// Times that are printed roughly stay on their uniform grid; where times jitter every channel is interpolated linearly to it, and
+/// `resampled` says so; a gap of more than 1.5 steps, or 5 where times jitter throughout, is an error with its place (core/time_grid.h has
+/// the rules).
 ///
-/// A `gauge` or `force` column in volts or counts is scaled by the meta data's `calibration` or `force_calibration`; without one it stays in
-/// volts or counts, with a warning. An unknown column that holds text is left out, with a warning.
+/// A `gauge` or `force` column in volts or counts is scaled by the meta data's `calibration` or `force_calibration`; without one it stays
+/// in volts or counts, with a warning. An unknown column that holds text is left out, with a warning.
 ///
 /// Throws InputError for everything that cannot be used: missing or unknown magic, unknown keys, units, header without units, ragged or
-/// truncated rows, decreasing or missing time, text or infinity in a column with a meaning, such a column without a single number, a negative
-/// or missing weight, a calibration of a column that has its unit already, a required key that is missing.
+/// truncated rows, decreasing or missing time, text or infinity in a column with a meaning, such a column without a single number, a
+/// negative or missing weight, a calibration of a column that has its unit already, a required key that is missing.
 Run read_run(const std::string& path);
 
 }  // namespace unrig

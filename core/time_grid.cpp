@@ -87,6 +87,14 @@ bool are_rounded(const VectorXd& stamps, double digit, double largest_jitter) {
          interval.maxCoeff() - interval.minCoeff() <= slack * digit;
 }
 
+/// Start and step by least squares: the first and the last stamp are rounded no less than the others.
+void fit_line(const VectorXd& stamps, TimeGrid& grid) {
+  const double last = static_cast<double>(stamps.size() - 1);
+  const VectorXd place = VectorXd::LinSpaced(stamps.size(), -last / 2, last / 2);
+  grid.step = place.dot(stamps) / place.squaredNorm();
+  grid.start = stamps.mean() - grid.step * last / 2;
+}
+
 void refuse_gaps(const CsvTable& table, const CsvColumn& time, const VectorXd& stamps, double digit) {
   const VectorXd interval = intervals(stamps);
   // Gaps lengthen the mean; coarse printing (1, 2, 2 ms) the median.
@@ -138,7 +146,10 @@ TimeGrid time_grid(const CsvTable& table, const CsvColumn& time) {
   if (grid.largest_jitter <= rounding_steps * grid.step) return grid;
 
   const double digit = last_digit(time.value);
-  if (are_rounded(stamps, digit, grid.largest_jitter)) return grid;
+  if (are_rounded(stamps, digit, grid.largest_jitter)) {
+    fit_line(stamps, grid);
+    return grid;
+  }
   refuse_gaps(table, time, stamps, digit);
   grid.resample = true;
   grid.stamps = std::move(stamps);

@@ -19,16 +19,15 @@ struct TimeGrid {
 
 /// Judges the stamps of `table`'s column `time`; everything is in that column's own unit.
 ///
-/// The grid runs from the first stamp to the last with as many samples as the file has.
-/// - Stamps within 1e-3 steps of it are on it, and so are stamps printed with few digits: within one unit of the last digit of it, with
-///   intervals that differ by no more than that, which is no more than half a step. Nothing is resampled.
+/// The grid has as many samples as the file, from the first stamp to the last.
+/// - Stamps within 1e-3 steps of it are on it. So are stamps printed with few digits: within one unit of the last digit of it, with
+///   intervals that differ by no more than that, which is no more than half a step; there least squares fit the grid. Nothing is
+///   resampled.
 /// - Other stamps jitter: the channels are to be interpolated.
 /// - A gap is an InputError with its place: an interval of more than 1.5 steps (median or mean, the shorter) that none of the next five
-/// stamps
-///   makes up. In a recording whose intervals jitter throughout (median deviation from the step above 1e-3 steps and the last printed
-///   digit) the limit is 5 steps.
-/// - Data loggers stamp a sample late and the next at the same instant. A run of equal stamps is spread evenly over the time since the
-/// stamp
+///   stamps makes up. In a recording whose intervals jitter throughout (median deviation from the step above 1e-3 steps and the last
+///   printed digit) the limit is 5 steps.
+/// - Data loggers stamp a sample late and the next at the same instant. A run of equal stamps is spread evenly over the time since the one
 ///   before, if that leaves at least half a step each.
 ///
 /// Every other stamp that does not increase, a missing one, and fewer than three rows are InputErrors.

@@ -112,7 +112,7 @@ bool widen_motion(JointProblem& joint, const std::vector<Run>& runs, Windows& wi
           k.first = std::max<Index>(w > 0 ? trial[w - 1].knots.last + 5 : 0, k.first - more);
         const auto added = static_cast<double>(k.length() - windows[r][w].knots.length());
         if (added <= 0) continue;
-        RunResidual wider(joint.model(), runs[r], trial);
+        RunResidual wider = joint.runs()[r].with_motion(trial);
         const VectorXd theta = joint.theta(r);
         wider.reject_spikes(theta);
         const double before = joint.runs()[r].evaluate(theta, Partials::none).chi2;

@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/run_inputs.h"
+
 namespace unrig {
 namespace {
 
@@ -12,55 +14,10 @@ using Eigen::MatrixXd;
 using Eigen::RowVectorXd;
 using Eigen::VectorXd;
 
-/// The triangular factor of `rows`: the same inner products in no more rows than columns.
+/// The upper triangular (or trapezoidal) factor of `rows`: the same inner products in no more rows than columns.
 MatrixXd compress(MatrixXd rows) {
-  if (rows.rows() <= rows.cols()) return rows;
   const Eigen::HouseholderQR<Eigen::Ref<MatrixXd>> qr(rows);  // in place
-  return rows.topRows(rows.cols()).triangularView<Eigen::Upper>();
-}
-
-/// Acceleration and velocity of the mount, one from the other where only one is measured.
-MatrixXd mount_inputs(const Run& run) {
-  const Channel* velocity = run.find("mount_velocity");
-  const Channel* acceleration = run.find("mount_acceleration");
-  const Index n = run.samples();
-  MatrixXd input(n, 2);
-  const auto filled = [](VectorXd x) {  // a missing sample holds the last value
-    double last = 0;
-    for (double& value : x) last = std::isfinite(value) ? value : last, value = last;
-    return x;
-  };
-  if (velocity) {
-    input.col(0) = filled(velocity->value);
-  } else {
-    const VectorXd a = filled(acceleration->value);
-    const double mean = a.mean();  // a constant offset would run away when integrated
-    input(0, 0) = 0;
-    for (Index k = 1; k < n; ++k) input(k, 0) = input(k - 1, 0) + 0.5 * run.dt * (a[k] + a[k - 1] - 2 * mean);
-  }
-  if (acceleration) {
-    input.col(1) = filled(acceleration->value);
-  } else {
-    const auto v = input.col(0);
-    for (Index k = 0; k < n; ++k) {
-      const Index before = std::max<Index>(0, k - 1), after = std::min(n - 1, k + 1);
-      input(k, 1) = (v[after] - v[before]) / (run.dt * static_cast<double>(after - before));
-    }
-  }
-  return input;
-}
-
-MatrixXd run_inputs(const Run& run, const Conditions& conditions) {
-  const Index n = run.samples();
-  MatrixXd input(n + 1, (conditions.force ? 1 : 0) + (conditions.mount ? 2 : 0));
-  Index column = 0;
-  if (conditions.force) {
-    input.col(column).head(n) = run.channel("force").value.unaryExpr([](double f) { return std::isfinite(f) ? f : 0.0; });
-    ++column;
-  }
-  if (conditions.mount) input.middleCols(column, 2).topRows(n) = mount_inputs(run);
-  if (input.cols() > 0) input.row(n) = input.row(n - 1);
-  return input;
+  return rows.topRows(std::min(rows.rows(), rows.cols())).triangularView<Eigen::Upper>();
 }
 
 }  // namespace
@@ -165,9 +122,11 @@ Index RunResidual::degrees_of_freedom() const { return observations() - unknowns
 RunResidual::Linearised RunResidual::linearise(const VectorXd& theta, Partials partials) const {
   Linearised lin;
   lin.system = model_->system(conditions_, theta, channels_);
-  if (partials == Partials::none)
-    for (DualMatrix* m : {&lin.system.A, &lin.system.B, &lin.system.C, &lin.system.D})
-      for (MatrixXd& p : m->partial) p.resize(0, 0);
+  for (DualMatrix* m : {&lin.system.A, &lin.system.B, &lin.system.C, &lin.system.D})
+    for (Index j = 0; j < m->parameters(); ++j) {
+      const bool wanted = differentiated_.empty() || std::find(differentiated_.begin(), differentiated_.end(), j) != differentiated_.end();
+      if (partials == Partials::none || !wanted) m->partial[static_cast<std::size_t>(j)].resize(0, 0);
+    }
   lin.step = exact_step(lin.system, run_->dt);
   if (inputs_.cols() > 0)
     lin.known = drive(lin.system, lin.step, DualMatrix(MatrixXd::Zero(lin.system.states(), 1)), run_->samples(), {}, inputs_, partials);
@@ -223,6 +182,7 @@ MatrixXd RunResidual::motion_state_columns(const MatrixXd& states, const MatrixX
 /// row for their scatter.
 void RunResidual::prepare_angle_rows() {
   angle_rows_.clear();
+  if (motion_prior_.rows() > 0) angle_rows_.push_back(motion_prior_);
   if (angle_offset_ < 0) return;
   for (const Segment& segment : segments_) {
     const Interval& s = segment.samples;
@@ -297,6 +257,18 @@ MatrixXd RunResidual::solve_rows(const Linearised& lin) const {
     row += block.rows();
   }
   return stack;
+}
+
+MatrixXd RunResidual::linear_rows(const VectorXd& theta) const {
+  RunResidual free = *this;
+  free.set_motion_prior({});
+  return compress(free.solve_rows(free.linearise(theta, Partials::none)));
+}
+
+void RunResidual::set_motion_prior(const MatrixXd& rows) {
+  motion_prior_ = MatrixXd::Zero(rows.rows(), unknowns_ + 1);
+  if (rows.rows() > 0) motion_prior_.leftCols(unknowns_) = rows;
+  prepare_angle_rows();
 }
 
 namespace {
@@ -406,6 +378,11 @@ RunResidual::Evaluation RunResidual::evaluate(const VectorXd& theta, Partials pa
   const MatrixXd triangle = compress(std::move(stack));
   const Index left = std::min(triangle.rows() - unknowns_, parameters + 1);
   result.jacobian = MatrixXd::Zero(parameters + 1, parameters);
+  if (left >= 0) {
+    const auto factor = triangle.topLeftCorner(unknowns_, unknowns_).triangularView<Eigen::Upper>();
+    result.linear_factor = factor;
+    result.linear_slope = factor.solve(triangle.block(0, unknowns_, unknowns_, parameters));
+  }
   if (left > 0) {
     result.jacobian.topRows(left) = triangle.block(unknowns_, unknowns_, left, parameters);
     result.residual.head(left) = triangle.block(unknowns_, unknowns_ + parameters, left, 1);
@@ -439,12 +416,26 @@ RunResidual::Prediction RunResidual::predict(const VectorXd& theta) const {
   return p;
 }
 
+RunResidual RunResidual::with_motion(std::vector<MotionBasis::Window> windows) const {
+  RunResidual other(*model_, *run_, std::move(windows));
+  other.sigma_ = sigma_;
+  other.weight_ = weight_;
+  other.angle_sigma_ = angle_sigma_;
+  other.angle_ = angle_;
+  other.angle_weight_ = angle_weight_;
+  other.spikes_ = spikes_;
+  other.prepare_angle_rows();
+  return other;
+}
+
 void RunResidual::settle_noise(const VectorXd& theta) {
   const Prediction p = predict(theta);
   const auto settle = [&](VectorXd residual, Eigen::Ref<VectorXd> weight, double& sigma) {
     for (Index k = 0; k < residual.size(); ++k)
       if (weight[k] == 0) residual[k] = std::nan("");
-    const double level = noise_level(residual, 3);
+    constexpr double chance = 0.06;  // two standard deviations between the two estimates for some thousand samples
+    const double third = noise_level(residual, 3), first = noise_level(residual, 1);
+    const double level = first < (1 + chance) * third ? first : third;
     if (!(level > 0) || level >= sigma) return;
     weight *= sigma / level;
     sigma = level;

@@ -35,6 +35,8 @@ class RunResidual {
     Eigen::VectorXd residual;  ///< P + 1
     Eigen::MatrixXd jacobian;  ///< (P + 1) x P, empty for Partials::none
     Eigen::VectorXd linear;    ///< c
+    Eigen::MatrixXd linear_slope;   ///< d c / d theta, empty for Partials::none
+    Eigen::MatrixXd linear_factor;  ///< R with R^T R the information matrix of c at fixed theta, empty for Partials::none
   };
   Evaluation evaluate(const Eigen::VectorXd& theta, Partials partials) const;
 
@@ -50,6 +52,14 @@ class RunResidual {
     Eigen::MatrixXd linear_factor; ///< R with R^T R = information matrix of c at fixed theta
   };
   Prediction predict(const Eigen::VectorXd& theta) const;
+
+  /// Parameters with respect to which `evaluate` differentiates; the other columns of the Jacobian are zero, and cost nothing. Empty: all.
+  void differentiate_only(std::vector<Eigen::Index> parameters) { differentiated_ = std::move(parameters); }
+
+  /// The linear unknowns' least-squares problem at theta, triangularised: [R | q], R c = q, without any prior on the motion.
+  Eigen::MatrixXd linear_rows(const Eigen::VectorXd& theta) const;
+  /// Rows over c that are held against zero beside the data (motion_prior); they count in chi-square. Empty: none.
+  void set_motion_prior(const Eigen::MatrixXd& rows);
 
   const Run& run() const { return *run_; }
   const AeroelasticModel& model() const { return *model_; }
@@ -69,8 +79,12 @@ class RunResidual {
   /// a motion that the model forces away from the measured one. Returns how many were newly left out.
   Eigen::Index reject_spikes(const Eigen::VectorXd& theta, double limit = 5);
 
+  /// The same run with other windows of motion; noise levels and samples left out stay as they are.
+  RunResidual with_motion(std::vector<MotionBasis::Window> windows) const;
+
   /// Takes the noise of each channel from what the model at theta leaves of it, where that is less: differences of the raw channel keep some of
-  /// a fast signal. Differences of third order still do not see a slow mismatch.
+  /// a fast signal. Differences do not see a slow mismatch: of first order (the most
+  /// efficient), unless those of third order are smaller by more than chance.
   void settle_noise(const Eigen::VectorXd& theta);
 
   Eigen::VectorXd channel_weight(std::size_t channel) const { return weight_.col(static_cast<Eigen::Index>(channel)); }
@@ -99,7 +113,9 @@ class RunResidual {
   std::vector<double> sigma_;
   Eigen::VectorXd angle_, angle_weight_;
   double angle_sigma_ = 0;
+  Eigen::MatrixXd motion_prior_;  ///< [c | 0]
   std::vector<Eigen::MatrixXd> angle_rows_;  ///< [c | angle], weighted; they do not depend on theta
+  std::vector<Eigen::Index> differentiated_;
   Eigen::MatrixXd inputs_;  ///< samples + 1 rows
   Eigen::Index spikes_ = 0;
   Eigen::Index last_sample_ = 0;

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "core/beam_flexibility.h"
+#include "core/text_file.h"
 #include "tests/support/shared_data.h"
 #include "tests/support/temporary_directory.h"
 
@@ -230,6 +231,10 @@ TEST(RigFlexibility, OfTheSeedIsAcceptedAndItsScanSlipsAreNot) {
   EXPECT_EQ(rig.torsion.inertia.size(), 13);
   // Checked in double precision by another program: -1.7318e-3, within 17 x 5e-4 = 8.5e-3.
   EXPECT_THAT(rig.warnings, ElementsAre(HasSubstr("the smallest -0.00173")));
+  // As scanned, 1706 reads 17.6 (errata, 3); set on both sides of the diagonal it is no slip of symmetry any more.
+  const std::string slip = replaced(read_text(rig.file), "1241, 1706", "1241, 17.6");
+  EXPECT_THAT(refusal(slip), HasSubstr("not symmetric"));
+  EXPECT_THAT(refusal(replaced(slip, "1273, 1706", "1273, 17.6")), HasSubstr("not positive definite"));
 }
 
 TEST(RigFlexibility, MeasuredOnesCarryTheirStandardDeviation) {
