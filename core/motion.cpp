@@ -116,6 +116,32 @@ Motion motion_of(const VectorXd& c, double dt) {
   return m;
 }
 
+Motion interpolated_motion(const VectorXd& angle, double dt) {
+  const Index n = angle.size();
+  if (n < 3 || !angle.allFinite()) throw std::invalid_argument("a spline needs three samples, and a number in each");
+  // Continuous rate at every knot: m_{k-1} + 4 m_k + m_{k+1} = 6 (p_{k-1} - 2 p_k + p_{k+1}) / dt^2 for the accelerations m, with
+  // 2 m_0 + m_1 = 6 (p_1 - p_0) / dt^2 at the resting start and m_{n-1} = m_{n-2} at the end; by elimination from the start.
+  VectorXd diagonal(n - 1), m(n);
+  diagonal[0] = 2;
+  m[0] = 6 * (angle[1] - angle[0]) / (dt * dt);
+  for (Index k = 1; k < n - 1; ++k) {
+    diagonal[k] = (k < n - 2 ? 4.0 : 5.0) - 1 / diagonal[k - 1];
+    m[k] = 6 * (angle[k - 1] - 2 * angle[k] + angle[k + 1]) / (dt * dt) - m[k - 1] / diagonal[k - 1];
+  }
+  m[n - 2] /= diagonal[n - 2];
+  for (Index k = n - 3; k >= 0; --k) m[k] = (m[k] - m[k + 1]) / diagonal[k];
+  m[n - 1] = m[n - 2];
+
+  Motion motion{angle.array() - angle[0], VectorXd(n), m, VectorXd(n)};
+  for (Index k = 0; k + 1 < n; ++k) {
+    motion.rate[k] = (angle[k + 1] - angle[k]) / dt - dt * (2 * m[k] + m[k + 1]) / 6;
+    motion.jerk[k] = (m[k + 1] - m[k]) / dt;
+  }
+  motion.rate[n - 1] = motion.rate[n - 2] + dt * m[n - 2];
+  motion.jerk[n - 1] = 0;
+  return motion;
+}
+
 double noise_level(const VectorXd& channel, int order) {
   std::vector<double> differences;
   std::vector<double> binomial(static_cast<std::size_t>(order) + 1, 1);

@@ -54,6 +54,12 @@ struct Motion {
 };
 Motion motion_of(const Eigen::VectorXd& coefficients, double dt);
 
+/// The cubic spline through samples of an angle (three at least, all finite), with its knots on them, as deviation from the first sample: for
+/// motions that are known rather than measured, since noise in the samples becomes acceleration divided by dt^2.
+/// It starts at rest, with zero rate at the first sample, and its acceleration is constant over the last step. Between samples of a smooth
+/// motion it is off by about dt^4/384 of its fourth derivative, and its acceleration at the samples by dt^2/12 of it.
+Motion interpolated_motion(const Eigen::VectorXd& angle, double dt);
+
 /// Standard deviation of the white part of a channel: from its differences of order `order`, scaled by their gain sqrt(C(2 order, order)), cut
 /// off at 3.5 of their median so that transients and spikes do not count. A slowly varying signal is suppressed by (2 sin(omega dt/2))^order. Missing
 /// samples are left out. A channel that is quantised more coarsely than its noise returns quantum/sqrt(12).

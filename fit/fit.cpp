@@ -1,6 +1,5 @@
 #include "fit/fit.h"
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <chrono>
 #include <cmath>
@@ -8,6 +7,7 @@
 #include <fmt/format.h>
 
 #include "fit/joint_problem.h"
+#include "fit/uncertainty.h"
 
 namespace unrig {
 namespace {
@@ -139,38 +139,18 @@ void refine_motion(JointProblem& joint, const FitProblem& problem, Windows& wind
   }
 }
 
-/// Covariance of the unknowns that are not held, in the order of `free`, at a reduced chi-square of one.
-struct Covariance {
-  std::vector<Index> free;
-  MatrixXd matrix;
-};
-
-Covariance covariance(const JointProblem& joint) {
-  const MatrixXd all = joint.linearise().jacobian;
-  Covariance c;
-  for (std::size_t i = 0; i < joint.unknowns().size(); ++i)
-    if (!joint.unknowns()[i].held) c.free.push_back(static_cast<Index>(i));
-  const auto count = static_cast<Index>(c.free.size());
-  MatrixXd jacobian(all.rows(), count);
-  for (Index i = 0; i < count; ++i) jacobian.col(i) = all.col(c.free[static_cast<std::size_t>(i)]);
-  const VectorXd scale = jacobian.colwise().norm().transpose().cwiseMax(1e-300).cwiseInverse();
-  const MatrixXd scaled = jacobian * scale.asDiagonal();
-  c.matrix = scale.asDiagonal() * (scaled.transpose() * scaled).ldlt().solve(MatrixXd::Identity(count, count)) * scale.asDiagonal();
-  return c;
-}
-
 /// A standard error as large as this says nothing that was not known before: half of itself, for a damping ratio 0.2.
 double ignorance(const Parameter& p, double value) {
   return p.name.ends_with("damping_ratio") ? 0.2 : 0.5 * std::max(std::abs(p.start), std::abs(value));
 }
 
 /// Unknowns that the data hardly touch go back to the rig file's value and are held there, so that they cannot bend the others.
-bool hold_weak(JointProblem& joint, double inflation) {
-  const Covariance c = covariance(joint);
+bool hold_weak(JointProblem& joint) {
+  const Uncertainty uncertainty = estimate_uncertainty(joint);
   bool held = false;
-  for (std::size_t a = 0; a < c.free.size(); ++a) {
-    Unknown& u = joint.unknowns()[static_cast<std::size_t>(c.free[a])];
-    const double error = inflation * std::sqrt(c.matrix(static_cast<Index>(a), static_cast<Index>(a)));
+  for (std::size_t a = 0; a < uncertainty.free.size(); ++a) {
+    Unknown& u = joint.unknowns()[static_cast<std::size_t>(uncertainty.free[a])];
+    const double error = std::sqrt(uncertainty.covariance()(static_cast<Index>(a), static_cast<Index>(a)));
     if (error < ignorance(joint.parameter(u), u.value)) continue;
     u.value = joint.parameter(u).start;
     u.held = held = true;
@@ -186,9 +166,7 @@ void settle(JointProblem& joint, const FitProblem& problem, Windows& windows, Fi
     run.settle_noise(joint.theta(r));
   }
   refine_motion(joint, problem, windows, result);
-  double freedom = 0;
-  for (const RunResidual& run : joint.runs()) freedom += static_cast<double>(run.degrees_of_freedom());
-  if (hold_weak(joint, std::sqrt(std::max(1.0, joint.chi2() / freedom)))) solve(joint, result);
+  if (hold_weak(joint)) solve(joint, result);
 }
 
 double rms(const VectorXd& x, const VectorXd& weight) {
@@ -262,13 +240,16 @@ std::string what_to_record(const std::string& name) {
 
 /// Standard errors and correlations of all unknowns that were not held.
 void describe_parameters(const JointProblem& joint, FitResult& result) {
-  const Covariance c = covariance(joint);
-  const double inflation = std::sqrt(std::max(1.0, result.reduced_chi2()));
-  const auto all = static_cast<Index>(joint.unknowns().size()), count = static_cast<Index>(c.free.size());
+  const Uncertainty uncertainty = estimate_uncertainty(joint);
+  const MatrixXd& covariance = uncertainty.covariance();
+  result.coloured = uncertainty.coloured;
+  for (std::size_t r = 0; r < joint.runs().size(); ++r) result.runs[r].whiteness = uncertainty.whiteness[r];
+  const auto all = static_cast<Index>(joint.unknowns().size()), count = static_cast<Index>(uncertainty.free.size());
   result.correlation = MatrixXd::Identity(all, all);
   for (Index a = 0; a < count; ++a)
     for (Index b = 0; b < count; ++b)
-      result.correlation(c.free[static_cast<std::size_t>(a)], c.free[static_cast<std::size_t>(b)]) = c.matrix(a, b) / std::sqrt(c.matrix(a, a) * c.matrix(b, b));
+      result.correlation(uncertainty.free[static_cast<std::size_t>(a)], uncertainty.free[static_cast<std::size_t>(b)]) =
+          covariance(a, b) / std::sqrt(covariance(a, a) * covariance(b, b));
 
   for (Index i = 0; i < all; ++i) {
     const Unknown& u = joint.unknowns()[static_cast<std::size_t>(i)];
@@ -280,13 +261,15 @@ void describe_parameters(const JointProblem& joint, FitResult& result) {
     fitted.value = u.value;
     fitted.start = p.start;
     fitted.std_error = std::nan("");
-    const auto position = std::find(c.free.begin(), c.free.end(), i);
-    if (position == c.free.end()) {
+    const auto position = std::find(uncertainty.free.begin(), uncertainty.free.end(), i);
+    if (position == uncertainty.free.end()) {
       fitted.identified = false;
       fitted.advice = u.why_held + "; held at the rig file's value. " + what_to_record(p.name);
     } else {
-      const Index a = position - c.free.begin();
-      fitted.std_error = inflation * std::sqrt(c.matrix(a, a));
+      const Index a = position - uncertainty.free.begin();
+      fitted.std_error = std::sqrt(covariance(a, a));
+      fitted.std_error_white = std::sqrt(uncertainty.white_covariance(a, a));
+      fitted.std_error_coloured = std::sqrt(uncertainty.coloured_covariance(a, a));
       if (u.value <= p.lower || u.value >= p.upper) {
         fitted.identified = false;
         fitted.advice = fmt::format("It ended at its bound {}. ", u.value) + what_to_record(p.name);

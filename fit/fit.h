@@ -26,6 +26,8 @@ struct FittedParameter {
   std::string run;        ///< file of the run it belongs to; empty where all share it
   double value = 0;
   double std_error = 0;   ///< one standard deviation; NaN where it could not be had
+  double std_error_white = 0;     ///< the same if the residuals were white
+  double std_error_coloured = 0;  ///< the same from the residuals' own spectra
   double start = 0;
   bool identified = true;
   std::string advice;     ///< where not identified: why, and what to record
@@ -47,6 +49,7 @@ struct FittedRun {
   double chi2 = 0;
   Eigen::Index degrees_of_freedom = 0;
   std::vector<FittedChannel> channels;  ///< the fitted outputs, then `alpha` where the motion was estimated
+  double whiteness = 1;  ///< probability that white noise looks at least as coloured as the residual
   double reduced_chi2() const { return chi2 / static_cast<double>(degrees_of_freedom); }
 };
 
@@ -61,6 +64,7 @@ struct FitResult {
   std::vector<FittedParameter> parameters;
   Eigen::MatrixXd correlation;  ///< of `parameters`; zero beside the diagonal for those that were held
   std::vector<FittedRun> runs;
+  bool coloured = false;        ///< which of the two standard errors `std_error` is
   std::string rig_file;
   Wagner circulation = Wagner::within_1e4;
   Eigen::Index normal_modes = 0, torsion_modes = 0;
@@ -75,7 +79,9 @@ struct FitResult {
 /// and offsets are eliminated exactly in every step (RunResidual). The fitted window grows from a few periods to the whole record, because
 /// a resonance that is off by a tenth has slipped whole cycles after ten.
 ///
-/// Standard errors: inverse Gauss-Newton Hessian, times the reduced chi-square where that exceeds one.
+/// Standard errors: where the residual of a run is white (1 % test of its cumulative periodogram), the inverse Gauss-Newton Hessian, times the reduced
+/// chi-square where that exceeds one; where any is coloured, the covariance that follows from the residuals' own spectra (fit/coloured_noise.h).
+/// Both are in the result.
 /// Throws InputError where a run does not belong to the rig.
 FitResult fit(const FitProblem& problem);
 

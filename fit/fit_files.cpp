@@ -45,10 +45,15 @@ std::string to_json(const FitResult& r) {
   out["bic"] = number(r.bic());
   out["circulation"] = name_of(r.circulation);
   out["modes"] = {{"normal", r.normal_modes}, {"torsion", r.torsion_modes}};
+  out["standard_errors"] = r.coloured ? "from the residuals' own spectra (coloured)" : "white residuals, times sqrt(reduced chi-square) where that exceeds one";
   out["parameters"] = json::array();
   for (const FittedParameter& p : r.parameters) {
     json item = {{"name", p.name},   {"value", number(p.value)}, {"std_error", number(p.std_error)},
                  {"unit", p.unit},   {"identified", p.identified}, {"start", number(p.start)}};
+    if (std::isfinite(p.std_error) && p.std_error_white > 0) {
+      item["std_error_white"] = number(p.std_error_white);
+      item["std_error_coloured"] = number(p.std_error_coloured);
+    }
     if (!p.run.empty()) item["run"] = p.run;
     if (!p.advice.empty()) item["advice"] = p.advice;
     out["parameters"].push_back(item);
@@ -67,7 +72,7 @@ std::string to_json(const FitResult& r) {
                           {"rms_residual", number(c.rms_residual)}, {"noise", number(c.noise)}});
     const FittedChannel& first = run.channels.front();
     out["runs"].push_back({{"file", run.file}, {"samples", run.samples}, {"rms_residual", number(first.rms_residual)}, {"noise", number(first.noise)},
-                           {"unit", first.unit}, {"reduced_chi2", number(run.reduced_chi2())}, {"channels", channels}});
+                           {"unit", first.unit}, {"reduced_chi2", number(run.reduced_chi2())}, {"whiteness", number(run.whiteness)}, {"channels", channels}});
   }
   out["warnings"] = r.warnings;
   return out.dump(2) + "\n";
@@ -154,6 +159,7 @@ std::string report(const FitResult& r, double least) {
   line("reduced chi-square", fmt::format("{:.5f}", r.reduced_chi2()));
   line("Akaike info crit", fmt::format("{:.2f}", r.aic()));
   line("Bayesian info crit", fmt::format("{:.2f}", r.bic()));
+  line("standard errors", r.coloured ? "residuals coloured: from their own spectra (for white ones in brackets)" : "residuals white");
   if (!r.converged) text += "    NOT CONVERGED: " + r.message + "\n";
 
   std::size_t width = 0;
@@ -162,8 +168,8 @@ std::string report(const FitResult& r, double least) {
   for (const FittedParameter& p : r.parameters) {
     const std::string unit = p.unit == "1" ? "" : " " + p.unit;
     if (std::isfinite(p.std_error))
-      text += fmt::format("    {:<{}} {: .7g} +/- {:.3g}{} ({:.2f}%) (init = {:.6g}){}\n", label(p) + ":", width + 1, p.value, p.std_error, unit,
-                          100 * std::abs(p.std_error / p.value), p.start, p.identified ? "" : " NOT IDENTIFIED");
+      text += fmt::format("    {:<{}} {: .7g} +/- {:.3g}{} ({:.2f}%) (init = {:.6g}){}{}\n", label(p) + ":", width + 1, p.value, p.std_error, unit,
+                          100 * std::abs(p.std_error / p.value), p.start, r.coloured && p.std_error_white > 0 ? fmt::format(" [{:.3g}]", p.std_error_white) : "", p.identified ? "" : " NOT IDENTIFIED");
     else
       text += fmt::format("    {:<{}} {: .7g}{} (fixed)\n", label(p) + ":", width + 1, p.value, unit);
     if (!p.advice.empty()) text += fmt::format("    {:<{}}  {}\n", "", width + 1, p.advice);

@@ -178,6 +178,14 @@ MatrixXd RunResidual::motion_state_columns(const MatrixXd& states, const MatrixX
   return columns;
 }
 
+/// d state / d c at the first sample of a segment.
+MatrixXd RunResidual::segment_start(const Linearised& lin, const Interval& samples) const {
+  MatrixXd start = MatrixXd::Zero(lin.system.states(), unknowns_);
+  if (motion_.unknowns() > 0) start.leftCols(motion_.unknowns()) = motion_state_columns(lin.spline, lin.spline_summed, samples.first);
+  if (free_states_ > 0 && samples.first == 0) start.block(0, first_state_, free_states_, free_states_).setIdentity();
+  return start;
+}
+
 /// Rows [c | angle] of the angle channel. Where the angle is constant all rows are alike and are one row with their common weight, besides a
 /// row for their scatter.
 void RunResidual::prepare_angle_rows() {
@@ -216,9 +224,6 @@ MatrixXd RunResidual::solve_rows(const Linearised& lin) const {
     const Interval s{segment.samples.first, std::min(segment.samples.last, last_sample_)};
     if (s.length() <= 0) break;
     const Index length = s.length();
-    MatrixXd start = MatrixXd::Zero(states, unknowns_);  // d state / d c at the segment's first sample
-    if (motion_.unknowns() > 0) start.leftCols(motion_.unknowns()) = motion_state_columns(lin.spline, lin.spline_summed, s.first);
-    if (free_states_ > 0 && s.first == 0) start.block(0, first_state_, free_states_, free_states_).setIdentity();
 
     if (segment.moving) {
       for (Index c = 0; c < channel_count; ++c) {
@@ -232,6 +237,7 @@ MatrixXd RunResidual::solve_rows(const Linearised& lin) const {
       continue;
     }
     const std::vector<MatrixXd>& free = lin.free;
+    const MatrixXd start = segment_start(lin, s);
     for (Index c = 0; c < channel_count; ++c) {
       MatrixXd m(length, states + 2);
       m.leftCols(states) = free[static_cast<std::size_t>(c)].topRows(length);
@@ -257,6 +263,51 @@ MatrixXd RunResidual::solve_rows(const Linearised& lin) const {
     row += block.rows();
   }
   return stack;
+}
+
+RunResidual::Sensitivity RunResidual::sensitivity(const VectorXd& theta) const {
+  const Linearised lin = linearise(theta, Partials::all);
+  const Evaluation e = evaluate(theta, Partials::all);
+  const auto parameters = static_cast<Index>(model_->parameters().size());
+  const Index channel_count = measured_.cols(), n = run_->samples();
+  Sensitivity result;
+  result.channels.assign(static_cast<std::size_t>(channel_count), {VectorXd::Zero(n), MatrixXd::Zero(n, parameters)});
+  DualMatrix state(MatrixXd::Zero(lin.system.states(), 1), parameters);
+  state.value.col(0).head(free_states_) = e.linear.segment(first_state_, free_states_);
+  VectorXd jerk;
+  if (motion_.unknowns() > 0) jerk = motion_of(motion_.coefficients(e.linear.head(motion_.unknowns())), run_->dt).jerk;
+  for (const Segment& segment : segments_) {
+    const Interval s{segment.samples.first, std::min(segment.samples.last, last_sample_)};
+    if (s.length() <= 0) break;
+    const Response response = segment.moving ? drive(lin.system, lin.step, state, s.length(), jerk.segment(s.first, s.length()), {}, Partials::all)
+                                             : coast(lin.system, lin.step, state, s.length(), Partials::all);
+    state = response.end;
+    const MatrixXd follow = segment.moving ? MatrixXd() : MatrixXd(segment_start(lin, s) * e.linear_slope);  // state moves with c, c with theta
+    for (Index c = 0; c < channel_count; ++c) {
+      auto& channel = result.channels[static_cast<std::size_t>(c)];
+      MatrixXd slope = segment.moving ? MatrixXd(motion_output_columns(lin, c, s) * e.linear_slope.topRows(motion_.unknowns()))
+                                      : MatrixXd(lin.free[static_cast<std::size_t>(c)].topRows(s.length()) * follow);
+      slope.rowwise() += e.linear_slope.row(first_offset_ + c);
+      VectorXd predicted = response.output.col(c).array() + e.linear[first_offset_ + c];
+      for (Index j = 0; j < parameters; ++j) {
+        const auto index = static_cast<std::size_t>(j);
+        if (index < response.partial.size() && response.partial[index].size() > 0) slope.col(j) += response.partial[index].col(c);
+        if (index < lin.known.partial.size() && lin.known.partial[index].size() > 0) slope.col(j) += lin.known.partial[index].col(c).segment(s.first, s.length());
+      }
+      if (lin.known.output.size() > 0) predicted += lin.known.output.col(c).segment(s.first, s.length());
+      const auto w = weight_.col(c).segment(s.first, s.length());
+      channel.residual.segment(s.first, s.length()) = w.cwiseProduct(measured_.col(c).segment(s.first, s.length()) - predicted);
+      channel.slope.middleRows(s.first, s.length()) = w.asDiagonal() * slope;
+    }
+  }
+  if (angle_offset_ >= 0) {
+    const MatrixXd columns = motion_.angle_columns({0, n});
+    const VectorXd predicted = (columns * e.linear.head(motion_.unknowns())).array() + e.linear[angle_offset_];
+    MatrixXd slope = columns * e.linear_slope.topRows(motion_.unknowns());
+    slope.rowwise() += e.linear_slope.row(angle_offset_);
+    result.channels.push_back({angle_weight_.cwiseProduct(angle_ - predicted), angle_weight_.asDiagonal() * slope});
+  }
+  return result;
 }
 
 MatrixXd RunResidual::linear_rows(const VectorXd& theta) const {
@@ -345,9 +396,7 @@ RunResidual::Evaluation RunResidual::evaluate(const VectorXd& theta, Partials pa
         stacked << w.asDiagonal() * columns, weighted;
       } else {
         const Index states = lin.system.states();
-        MatrixXd start = MatrixXd::Zero(states, unknowns_);
-        if (motion_.unknowns() > 0) start.leftCols(motion_.unknowns()) = motion_state_columns(lin.spline, lin.spline_summed, s.first);
-        if (free_states_ > 0 && s.first == 0) start.block(0, first_state_, free_states_, free_states_).setIdentity();
+        const MatrixXd start = segment_start(lin, s);
         MatrixXd m(s.length(), states + 1 + parameters + 1);
         m.leftCols(states) = w.asDiagonal() * lin.free[static_cast<std::size_t>(c)].topRows(s.length());
         m.col(states) = w;

@@ -56,6 +56,16 @@ class RunResidual {
   /// Parameters with respect to which `evaluate` differentiates; the other columns of the Jacobian are zero, and cost nothing. Empty: all.
   void differentiate_only(std::vector<Eigen::Index> parameters) { differentiated_ = std::move(parameters); }
 
+  /// Sample by sample and in units of the noise: what is left, and how the prediction moves with theta while c follows. Left-out samples are 0.
+  struct Sensitivity {
+    struct PerChannel {
+      Eigen::VectorXd residual;
+      Eigen::MatrixXd slope;  ///< samples x P
+    };
+    std::vector<PerChannel> channels;  ///< the fitted outputs, then the angle where the motion is estimated
+  };
+  Sensitivity sensitivity(const Eigen::VectorXd& theta) const;
+
   /// The linear unknowns' least-squares problem at theta, triangularised: [R | q], R c = q, without any prior on the motion.
   Eigen::MatrixXd linear_rows(const Eigen::VectorXd& theta) const;
   /// Rows over c that are held against zero beside the data (motion_prior); they count in chi-square. Empty: none.
@@ -100,6 +110,7 @@ class RunResidual {
   Eigen::MatrixXd solve_rows(const Linearised& lin) const;
   Eigen::MatrixXd motion_state_columns(const Eigen::MatrixXd& states, const Eigen::MatrixXd& summed, Eigen::Index sample) const;
   Eigen::MatrixXd motion_output_columns(const Linearised& lin, Eigen::Index channel, const Interval& samples) const;
+  Eigen::MatrixXd segment_start(const Linearised& lin, const Interval& samples) const;
   void prepare_angle_rows();
 
   const AeroelasticModel* model_;

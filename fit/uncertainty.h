@@ -1,0 +1,23 @@
+#pragma once
+#include <Eigen/Core>
+#include <vector>
+
+#include "fit/joint_problem.h"
+
+namespace unrig {
+
+/// Covariance of the unknowns of a joint fit that are not held, both ways.
+struct Uncertainty {
+  std::vector<Eigen::Index> free;        ///< which unknowns, in the order of the matrices
+  Eigen::MatrixXd white_covariance;      ///< H^-1, times the reduced chi-square where that exceeds one
+  Eigen::MatrixXd coloured_covariance;   ///< H^-1 (J^T Sigma J) H^-1 with the residuals' own spectra (fit/coloured_noise.h)
+  bool coloured = false;                 ///< some run's residual is not white: its probability, times the number of runs, is below 1 %
+  std::vector<double> whiteness;         ///< per run
+
+  const Eigen::MatrixXd& covariance() const { return coloured ? coloured_covariance : white_covariance; }
+};
+
+/// At the present values, which should be those of a finished fit.
+Uncertainty estimate_uncertainty(const JointProblem& joint);
+
+}  // namespace unrig
