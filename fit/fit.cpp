@@ -3,9 +3,11 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <limits>
 
 #include <fmt/format.h>
 
+#include "fit/first_guess.h"
 #include "fit/joint_problem.h"
 #include "fit/uncertainty.h"
 
@@ -69,22 +71,23 @@ void solve(JointProblem& joint, FitResult& result, const JointProblem::SolveOpti
   result.message = summary.message;
 }
 
-/// From the rig file's values to the whole record by way of windows that grow from a few periods.
-JointProblem arrive(const AeroelasticModel& model, const FitProblem& problem, const Windows& windows, FitResult& result) {
+/// Horizons of the growing window, in samples; the last, 0, is the whole record.
+std::vector<Index> growing_horizons(const std::vector<Run>& runs) {
   Index longest = 0;
-  for (const Run& run : problem.runs) longest = std::max(longest, run.samples());
+  for (const Run& run : runs) longest = std::max(longest, run.samples());
   constexpr Index shortest = 40, growth = 4;
   std::vector<Index> horizons{0};
   for (Index horizon = longest / growth; horizon >= shortest; horizon /= growth) horizons.insert(horizons.begin(), horizon);
+  return horizons;
+}
 
-  JointProblem joint = make_joint(model, problem.runs, windows, horizons.front());
-  hold_undetermined(joint);
-  for (std::size_t stage = 0; stage < horizons.size(); ++stage) {
-    if (stage > 0) {
-      JointProblem longer = make_joint(model, problem.runs, windows, horizons[stage]);
-      carry_over(joint, longer);
-      joint = std::move(longer);
-    }
+/// Follows the growing window through the stages [first, last) from the values of `joint`.
+JointProblem follow(JointProblem joint, const FitProblem& problem, const Windows& windows, const std::vector<Index>& horizons, std::size_t first, std::size_t last,
+                    FitResult& result) {
+  for (std::size_t stage = first; stage < last; ++stage) {
+    JointProblem longer = make_joint(joint.model(), problem.runs, windows, horizons[stage]);
+    carry_over(joint, longer);
+    joint = std::move(longer);
     const bool whole = horizons[stage] == 0;
     tell(problem, whole ? "fitting the whole record" : fmt::format("fitting the first {} samples", horizons[stage]));
     JointProblem::SolveOptions options;
@@ -94,6 +97,50 @@ JointProblem arrive(const AeroelasticModel& model, const FitProblem& problem, co
     solve(joint, result, options);
   }
   return joint;
+}
+
+double reduced_chi2(const JointProblem& joint) {
+  double freedom = 0;
+  for (const RunResidual& run : joint.runs()) freedom += static_cast<double>(run.degrees_of_freedom());
+  return joint.chi2() / freedom;
+}
+
+/// From the rig file's values to the whole record by way of windows that grow from a few periods. Where that leaves the record unexplained, the early
+/// stages are tried once more from stiffnesses around the first guess, and the best of them goes on.
+JointProblem arrive(const AeroelasticModel& model, const FitProblem& problem, const Windows& windows, FitResult& result) {
+  const std::vector<Index> horizons = growing_horizons(problem.runs);
+  JointProblem start = make_joint(model, problem.runs, windows, horizons.front());
+  for (const auto& [name, value] : problem.start)
+    for (Unknown& u : start.unknowns())
+      if (start.parameter(u).name == name) u.value = value;
+  hold_undetermined(start);
+  guess_from_spectra(start);
+  JointProblem joint = follow(start, problem, windows, horizons, 0, horizons.size(), result);
+  constexpr double explained = 2;
+  const double first_try = reduced_chi2(joint);
+  if (first_try < explained || horizons.size() < 2) return joint;
+
+  const std::size_t early = std::min<std::size_t>(2, horizons.size() - 1);
+  JointProblem best = joint;
+  double least = std::numeric_limits<double>::infinity();
+  for (const double torsion : {0.5, 1.0, 2.0})
+    for (const double normal : {0.5, 1.0, 2.0}) {
+      if (torsion == 1 && normal == 1) continue;
+      JointProblem other = start;
+      for (Unknown& u : other.unknowns()) {
+        const std::string& name = other.parameter(u).name;
+        if (u.held || name.find("stiffness") == std::string::npos) continue;
+        u.value = std::clamp(u.value * (name.starts_with("torsion") ? torsion : normal), other.parameter(u).lower, other.parameter(u).upper);
+      }
+      tell(problem, "trying other starts");
+      other = follow(other, problem, windows, horizons, 0, early, result);
+      if (const double chi2 = other.chi2(); chi2 < least) {
+        least = chi2;
+        best = other;
+      }
+    }
+  best = follow(best, problem, windows, horizons, early, horizons.size(), result);
+  return reduced_chi2(best) < first_try ? best : joint;
 }
 
 /// Widens a window of the motion where the gauge still sees the shaft move beyond it: chi-square must fall by clearly more than the knots added.
@@ -129,7 +176,7 @@ bool widen_motion(JointProblem& joint, const std::vector<Run>& runs, Windows& wi
 }
 
 void refine_motion(JointProblem& joint, const FitProblem& problem, Windows& windows, FitResult& result) {
-  constexpr int rounds = 6;
+  constexpr int rounds = 4;
   for (int round = 0; round < rounds; ++round) {
     Index rejected = 0;
     for (std::size_t r = 0; r < joint.runs().size(); ++r) rejected += joint.runs()[r].reject_spikes(joint.theta(r));

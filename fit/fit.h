@@ -1,6 +1,7 @@
 #pragma once
 #include <Eigen/Core>
 #include <functional>
+#include <map>
 #include <string>
 #include <vector>
 
@@ -17,6 +18,7 @@ struct FitProblem {
   Rig rig;
   std::vector<Run> runs;
   Wagner circulation = Wagner::within_1e4;
+  std::map<std::string, double> start;  ///< start values other than the rig file's, by parameter name
   std::function<void(const std::string&)> progress;  ///< told what is being done; empty: silent
 };
 
@@ -77,7 +79,8 @@ struct FitResult {
 
 /// Joint least-squares fit (Ceres, Levenberg-Marquardt). The residuals are divided by each channel's own noise level; motion, initial states, steady loads
 /// and offsets are eliminated exactly in every step (RunResidual). The fitted window grows from a few periods to the whole record, because
-/// a resonance that is off by a tenth has slipped whole cycles after ten.
+/// a resonance that is off by a tenth has slipped whole cycles after ten. It starts from the strongest line in the spectra of the free decays, and where the
+/// whole record is not explained in the end, once more from stiffnesses around it.
 ///
 /// Standard errors: where the residual of a run is white (1 % test of its cumulative periodogram), the inverse Gauss-Newton Hessian, times the reduced
 /// chi-square where that exceeds one; where any is coloured, the covariance that follows from the residuals' own spectra (fit/coloured_noise.h).

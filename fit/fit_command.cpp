@@ -13,11 +13,12 @@ namespace unrig {
 int fit_command(int argc, char** argv) {
   CLI::App app{"Fits stiffness, damping and apparent mass of a rig to recordings, all together.", "unrig fit"};
   std::string rig_path, output, circulation = "1e-4";
-  std::vector<std::string> run_paths;
+  std::vector<std::string> run_paths, starts;
   double least = 0.1;
   app.add_option("--rig", rig_path, "rig file (TOML)")->required();
   app.add_option("runs", run_paths, "run files (CSV): free decays and steps of this rig, in any number")->required();
   app.add_option("-o,--output", output, "result (JSON)")->required();
+  app.add_option("--start", starts, "start value of a parameter, NAME=VALUE (repeatable)");
   app.add_option("--wagner", circulation, "circulatory build-up: 1e-4, 1e-6 (largest error), jones, seed")->capture_default_str();
   app.add_option("--correlations", least, "smallest correlation to report")->capture_default_str();
   app.footer("Example:\n  unrig fit --rig rig.toml dry_pluck.csv wet_pluck.csv step_a.csv -o fit.json");
@@ -35,6 +36,15 @@ int fit_command(int argc, char** argv) {
     throw InputError({"--wagner", 0}, e.what(), "wanted one of the names above", "");
   }
   for (const std::string& path : run_paths) problem.runs.push_back(read_run(path));
+  for (const std::string& start : starts) {
+    const std::size_t equals = start.find('=');
+    const char* text = start.c_str() + (equals == std::string::npos ? 0 : equals + 1);
+    char* end = nullptr;
+    const double value = std::strtod(text, &end);
+    if (equals == std::string::npos || end == text || *end != '\0')
+      throw InputError({"--start", 0}, "'" + start + "'", "wanted NAME=VALUE", "Names are those of the report, values are in SI.");
+    problem.start[start.substr(0, equals)] = value;
+  }
   Progress progress;
   problem.progress = [&](const std::string& what) { progress(what); };
   const FitResult result = fit(problem);
