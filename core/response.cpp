@@ -1,5 +1,6 @@
 #include "core/response.h"
 
+#include <algorithm>
 #include <array>
 
 namespace unrig {
@@ -44,6 +45,14 @@ DualMatrix to_the_block_length(DualMatrix transition) {
 }  // namespace
 
 Response coast(const LinearSystem& system, const ExactStep& step, const DualMatrix& start, Index samples, Partials partials) {
+  const bool at_rest = start.value.isZero(0) && std::all_of(start.partial.begin(), start.partial.end(), [](const MatrixXd& p) { return p.isZero(0); });
+  if (at_rest) {
+    Response rest = make_response(samples, system, partials);
+    rest.output.setZero();
+    for (MatrixXd& p : rest.partial) p.setZero();
+    rest.end = start;
+    return rest;
+  }
   const bool with_partials = partials == Partials::all;
   const DualMatrix transition = with_partials ? step.transition : without_partials(step.transition);
   const DualMatrix observe = observation_block(with_partials ? system.C : without_partials(system.C), transition);

@@ -75,7 +75,7 @@ void solve(JointProblem& joint, FitResult& result, const JointProblem::SolveOpti
 std::vector<Index> growing_horizons(const std::vector<Run>& runs) {
   Index longest = 0;
   for (const Run& run : runs) longest = std::max(longest, run.samples());
-  constexpr Index shortest = 40, growth = 4;
+  constexpr Index shortest = 40, growth = 8;
   std::vector<Index> horizons{0};
   for (Index horizon = longest / growth; horizon >= shortest; horizon /= growth) horizons.insert(horizons.begin(), horizon);
   return horizons;
@@ -192,8 +192,7 @@ double ignorance(const Parameter& p, double value) {
 }
 
 /// Unknowns that the data hardly touch go back to the rig file's value and are held there, so that they cannot bend the others.
-bool hold_weak(JointProblem& joint) {
-  const Uncertainty uncertainty = estimate_uncertainty(joint);
+bool hold_weak(JointProblem& joint, const Uncertainty& uncertainty) {
   bool held = false;
   for (std::size_t a = 0; a < uncertainty.free.size(); ++a) {
     Unknown& u = joint.unknowns()[static_cast<std::size_t>(uncertainty.free[a])];
@@ -207,13 +206,16 @@ bool hold_weak(JointProblem& joint) {
 }
 
 /// Noise, motion, and what the data cannot determine: each looked at again once the model fits.
-void settle(JointProblem& joint, const FitProblem& problem, Windows& windows, FitResult& result) {
+Uncertainty settle(JointProblem& joint, const FitProblem& problem, Windows& windows, FitResult& result) {
   for (RunResidual& run : joint.runs()) {
     const std::size_t r = static_cast<std::size_t>(&run - joint.runs().data());
     run.settle_noise(joint.theta(r));
   }
   refine_motion(joint, problem, windows, result);
-  if (hold_weak(joint)) solve(joint, result);
+  const Uncertainty uncertainty = estimate_uncertainty(joint);
+  if (!hold_weak(joint, uncertainty)) return uncertainty;
+  solve(joint, result);
+  return estimate_uncertainty(joint);
 }
 
 double rms(const VectorXd& x, const VectorXd& weight) {
@@ -286,8 +288,7 @@ std::string what_to_record(const std::string& name) {
 }
 
 /// Standard errors and correlations of all unknowns that were not held.
-void describe_parameters(const JointProblem& joint, FitResult& result) {
-  const Uncertainty uncertainty = estimate_uncertainty(joint);
+void describe_parameters(const JointProblem& joint, const Uncertainty& uncertainty, FitResult& result) {
   const MatrixXd& covariance = uncertainty.covariance();
   result.coloured = uncertainty.coloured;
   for (std::size_t r = 0; r < joint.runs().size(); ++r) result.runs[r].whiteness = uncertainty.whiteness[r];
@@ -357,7 +358,7 @@ FitResult fit(const FitProblem& problem) {
   }
   JointProblem joint = arrive(model, problem, windows, result);
   hold_undetermined(joint);
-  settle(joint, problem, windows, result);
+  const Uncertainty uncertainty = settle(joint, problem, windows, result);
 
   const JointProblem::Linearisation lin = joint.linearise();
   result.chi2 = lin.chi2();
@@ -367,7 +368,7 @@ FitResult fit(const FitProblem& problem) {
     result.variables += joint.runs()[r].linear_unknowns();
     result.runs.push_back(describe_run(joint.runs()[r], joint.theta(r), lin.run_chi2[r]));
   }
-  describe_parameters(joint, result);
+  describe_parameters(joint, uncertainty, result);
   for (std::size_t r = 0; r < joint.runs().size(); ++r) add_steady_load(joint.runs()[r], joint.theta(r), result);
   const auto all = static_cast<Index>(result.parameters.size()), known = result.correlation.rows();
   result.correlation.conservativeResizeLike(MatrixXd::Identity(all, all));
