@@ -24,8 +24,15 @@ class RunCost : public ceres::CostFunction {
   bool Evaluate(double const* const* values, double* residuals, double** jacobians) const override {
     VectorXd theta = theta_;
     for (std::size_t i = 0; i < parameters_.size(); ++i) theta[parameters_[i]] = *values[i];
-    const RunResidual::Evaluation e = run_.evaluate(theta, jacobians ? Partials::all : Partials::none);
-    if (!std::isfinite(e.chi2)) return false;  // an unstable model: the solver takes a shorter step
+    if (last_.theta.size() == 0 || last_.theta != theta) last_ = run_.solve(theta);
+    if (!std::isfinite(last_.chi2)) return false;  // an unstable model: the solver takes a shorter step
+    if (!jacobians) {
+      Eigen::Map<VectorXd> residual(residuals, num_residuals());
+      residual.setZero();
+      residual[num_residuals() - 1] = std::sqrt(last_.chi2);
+      return true;
+    }
+    const RunResidual::Evaluation e = run_.differentiate(last_);
     Eigen::Map<VectorXd>(residuals, num_residuals()) = e.residual;
     if (jacobians)
       for (std::size_t i = 0; i < parameters_.size(); ++i)
@@ -37,6 +44,7 @@ class RunCost : public ceres::CostFunction {
   const RunResidual& run_;
   VectorXd theta_;
   std::vector<Index> parameters_;
+  mutable RunResidual::Solution last_;  ///< the solver asks for the value first and for the derivative where the value was good
 };
 
 /// (value - centre) / width.

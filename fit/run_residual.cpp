@@ -1,26 +1,15 @@
 #include "fit/run_residual.h"
 
-#include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
 
 #include "core/run_inputs.h"
 
 namespace unrig {
-namespace {
 
 using Eigen::Index;
 using Eigen::MatrixXd;
-using Eigen::RowVectorXd;
 using Eigen::VectorXd;
-
-/// The upper triangular (or trapezoidal) factor of `rows`: the same inner products in no more rows than columns.
-MatrixXd compress(MatrixXd rows) {
-  const Eigen::HouseholderQR<Eigen::Ref<MatrixXd>> qr(rows);  // in place
-  return rows.topRows(std::min(rows.rows(), rows.cols())).triangularView<Eigen::Upper>();
-}
-
-}  // namespace
 
 std::vector<MotionBasis::Window> motion_windows(const Run& run) {
   const Channel* alpha = run.find("alpha");
@@ -42,16 +31,6 @@ std::vector<MotionBasis::Window> motion_windows(const Run& run) {
   for (auto& w : windows) w.stride = 1 + total / (most_knots + 1);
   return windows;
 }
-
-/// The model at one theta: its exact step, what the inputs alone do, and where the unknown motion takes the states.
-struct RunResidual::Linearised {
-  LinearSystem system;
-  ExactStep step;
-  Response known;          // response to the measured inputs, empty without
-  MatrixXd spline;         // states after a unit spline, n x samples
-  MatrixXd spline_summed;  // and their running sum: states after splines at every sample
-  std::vector<MatrixXd> free;  // rows of the free response per channel, for the longest segment at rest
-};
 
 RunResidual::RunResidual(const AeroelasticModel& model, const Run& run, std::vector<MotionBasis::Window> motion, RunOptions options)
     : model_(&model),
@@ -119,73 +98,6 @@ Index RunResidual::observations() const {
 
 Index RunResidual::degrees_of_freedom() const { return observations() - unknowns_; }
 
-RunResidual::Linearised RunResidual::linearise(const VectorXd& theta, Partials partials) const {
-  Linearised lin;
-  lin.system = model_->system(conditions_, theta, channels_);
-  for (DualMatrix* m : {&lin.system.A, &lin.system.B, &lin.system.C, &lin.system.D})
-    for (Index j = 0; j < m->parameters(); ++j) {
-      const bool wanted = differentiated_.empty() || std::find(differentiated_.begin(), differentiated_.end(), j) != differentiated_.end();
-      if (partials == Partials::none || !wanted) m->partial[static_cast<std::size_t>(j)].resize(0, 0);
-    }
-  lin.step = exact_step(lin.system, run_->dt);
-  if (inputs_.cols() > 0)
-    lin.known = drive(lin.system, lin.step, DualMatrix(MatrixXd::Zero(lin.system.states(), 1)), run_->samples(), {}, inputs_, partials);
-  if (motion_.unknowns() > 0) {
-    Index reach = 0;
-    for (const Segment& s : segments_)
-      if (s.moving) reach = std::max(reach, s.samples.last - segments_.front().samples.first);
-    lin.spline = spline_states(lin.step, reach + 1 - motion_.columns().front().first + 4);
-    lin.spline_summed = lin.spline;
-    for (Index k = 1; k < lin.spline.cols(); ++k) lin.spline_summed.col(k) += lin.spline_summed.col(k - 1);
-  }
-  Index longest = 0;
-  for (const Segment& s : segments_)
-    if (!s.moving) longest = std::max(longest, std::min(s.samples.last, last_sample_) - s.samples.first);
-  lin.free = free_response_rows(lin.system, lin.step, longest);
-  return lin;
-}
-
-/// d output / d motion unknowns over a segment in which the shaft moves: the response to one spline, shifted.
-MatrixXd RunResidual::motion_output_columns(const Linearised& lin, Index channel, const Interval& samples) const {
-  const RowVectorXd unit = lin.system.C.value.row(channel) * lin.spline, summed = lin.system.C.value.row(channel) * lin.spline_summed;
-  MatrixXd columns = MatrixXd::Zero(samples.length(), motion_.unknowns());
-  for (Index j = 0; j < motion_.unknowns(); ++j) {
-    const MotionBasis::Column& column = motion_.columns()[static_cast<std::size_t>(j)];
-    const auto add = [&](const RowVectorXd& response, Index knot, double amount) {
-      const Index from = std::max(samples.first, knot + 1);
-      if (amount == 0 || from >= samples.last) return;
-      columns.col(j).tail(samples.last - from) += amount * response.segment(from - knot, samples.last - from).transpose();
-    };
-    for (Index i = 0; i < column.value.size(); ++i) add(unit, column.first + i, column.value[i]);
-    add(summed, column.first + column.value.size(), column.tail);
-  }
-  return columns;
-}
-
-/// d state / d motion unknowns at `sample`.
-MatrixXd RunResidual::motion_state_columns(const MatrixXd& states, const MatrixXd& summed, Index sample) const {
-  MatrixXd columns = MatrixXd::Zero(states.rows(), motion_.unknowns());
-  for (Index j = 0; j < motion_.unknowns(); ++j) {
-    const MotionBasis::Column& column = motion_.columns()[static_cast<std::size_t>(j)];
-    for (Index i = 0; i < column.value.size(); ++i) {
-      const Index since = sample - column.first - i;
-      if (since <= 0) break;
-      columns.col(j) += column.value[i] * states.col(since);
-    }
-    const Index since_tail = sample - column.first - column.value.size();
-    if (column.tail != 0 && since_tail > 0) columns.col(j) += column.tail * summed.col(since_tail);
-  }
-  return columns;
-}
-
-/// d state / d c at the first sample of a segment.
-MatrixXd RunResidual::segment_start(const Linearised& lin, const Interval& samples) const {
-  MatrixXd start = MatrixXd::Zero(lin.system.states(), unknowns_);
-  if (motion_.unknowns() > 0) start.leftCols(motion_.unknowns()) = motion_state_columns(lin.spline, lin.spline_summed, samples.first);
-  if (free_states_ > 0 && samples.first == 0) start.block(0, first_state_, free_states_, free_states_).setIdentity();
-  return start;
-}
-
 /// Rows [c | angle] of the angle channel. Where the angle is constant all rows are alike and are one row with their common weight, besides a
 /// row for their scatter.
 void RunResidual::prepare_angle_rows() {
@@ -216,253 +128,10 @@ void RunResidual::prepare_angle_rows() {
   }
 }
 
-/// All rows [c | y] at this theta, compressed.
-MatrixXd RunResidual::solve_rows(const Linearised& lin) const {
-  const Index states = lin.system.states(), channel_count = measured_.cols();
-  std::vector<MatrixXd> blocks;
-  for (const Segment& segment : segments_) {
-    const Interval s{segment.samples.first, std::min(segment.samples.last, last_sample_)};
-    if (s.length() <= 0) break;
-    const Index length = s.length();
-
-    if (segment.moving) {
-      for (Index c = 0; c < channel_count; ++c) {
-        MatrixXd m = MatrixXd::Zero(length, unknowns_ + 1);
-        m.leftCols(motion_.unknowns()) = motion_output_columns(lin, c, s);
-        m.col(first_offset_ + c).setOnes();
-        m.col(unknowns_) = measured_.col(c).segment(s.first, length);
-        if (lin.known.output.size() > 0) m.col(unknowns_) -= lin.known.output.col(c).segment(s.first, length);
-        blocks.push_back(weight_.col(c).segment(s.first, length).asDiagonal() * m);
-      }
-      continue;
-    }
-    const std::vector<MatrixXd>& free = lin.free;
-    const MatrixXd start = segment_start(lin, s);
-    for (Index c = 0; c < channel_count; ++c) {
-      MatrixXd m(length, states + 2);
-      m.leftCols(states) = free[static_cast<std::size_t>(c)].topRows(length);
-      m.col(states).setOnes();
-      m.col(states + 1) = measured_.col(c).segment(s.first, length);
-      if (lin.known.output.size() > 0) m.col(states + 1) -= lin.known.output.col(c).segment(s.first, length);
-      m = compress(weight_.col(c).segment(s.first, length).asDiagonal() * m);
-      MatrixXd rows = MatrixXd::Zero(m.rows(), unknowns_ + 1);
-      rows.leftCols(unknowns_).noalias() = m.leftCols(states) * start;
-      rows.col(first_offset_ + c) += m.col(states);
-      rows.col(unknowns_) = m.col(states + 1);
-      blocks.push_back(std::move(rows));
-    }
-  }
-  blocks.insert(blocks.end(), angle_rows_.begin(), angle_rows_.end());
-
-  Index total = 0;
-  for (const MatrixXd& block : blocks) total += block.rows();
-  MatrixXd stack(total, unknowns_ + 1);
-  Index row = 0;
-  for (const MatrixXd& block : blocks) {
-    stack.middleRows(row, block.rows()) = block;
-    row += block.rows();
-  }
-  return stack;
-}
-
-RunResidual::Sensitivity RunResidual::sensitivity(const VectorXd& theta) const {
-  const Linearised lin = linearise(theta, Partials::all);
-  const Evaluation e = evaluate(theta, Partials::all);
-  const auto parameters = static_cast<Index>(model_->parameters().size());
-  const Index channel_count = measured_.cols(), n = run_->samples();
-  Sensitivity result;
-  result.channels.assign(static_cast<std::size_t>(channel_count), {VectorXd::Zero(n), MatrixXd::Zero(n, parameters)});
-  DualMatrix state(MatrixXd::Zero(lin.system.states(), 1), parameters);
-  state.value.col(0).head(free_states_) = e.linear.segment(first_state_, free_states_);
-  VectorXd jerk;
-  if (motion_.unknowns() > 0) jerk = motion_of(motion_.coefficients(e.linear.head(motion_.unknowns())), run_->dt).jerk;
-  for (const Segment& segment : segments_) {
-    const Interval s{segment.samples.first, std::min(segment.samples.last, last_sample_)};
-    if (s.length() <= 0) break;
-    const Response response = segment.moving ? drive(lin.system, lin.step, state, s.length(), jerk.segment(s.first, s.length()), {}, Partials::all)
-                                             : coast(lin.system, lin.step, state, s.length(), Partials::all);
-    state = response.end;
-    const MatrixXd follow = segment.moving ? MatrixXd() : MatrixXd(segment_start(lin, s) * e.linear_slope);  // state moves with c, c with theta
-    for (Index c = 0; c < channel_count; ++c) {
-      auto& channel = result.channels[static_cast<std::size_t>(c)];
-      MatrixXd slope = segment.moving ? MatrixXd(motion_output_columns(lin, c, s) * e.linear_slope.topRows(motion_.unknowns()))
-                                      : MatrixXd(lin.free[static_cast<std::size_t>(c)].topRows(s.length()) * follow);
-      slope.rowwise() += e.linear_slope.row(first_offset_ + c);
-      VectorXd predicted = response.output.col(c).array() + e.linear[first_offset_ + c];
-      for (Index j = 0; j < parameters; ++j) {
-        const auto index = static_cast<std::size_t>(j);
-        if (index < response.partial.size() && response.partial[index].size() > 0) slope.col(j) += response.partial[index].col(c);
-        if (index < lin.known.partial.size() && lin.known.partial[index].size() > 0) slope.col(j) += lin.known.partial[index].col(c).segment(s.first, s.length());
-      }
-      if (lin.known.output.size() > 0) predicted += lin.known.output.col(c).segment(s.first, s.length());
-      const auto w = weight_.col(c).segment(s.first, s.length());
-      channel.residual.segment(s.first, s.length()) = w.cwiseProduct(measured_.col(c).segment(s.first, s.length()) - predicted);
-      channel.slope.middleRows(s.first, s.length()) = w.asDiagonal() * slope;
-    }
-  }
-  if (angle_offset_ >= 0) {
-    const MatrixXd columns = motion_.angle_columns({0, n});
-    const VectorXd predicted = (columns * e.linear.head(motion_.unknowns())).array() + e.linear[angle_offset_];
-    MatrixXd slope = columns * e.linear_slope.topRows(motion_.unknowns());
-    slope.rowwise() += e.linear_slope.row(angle_offset_);
-    result.channels.push_back({angle_weight_.cwiseProduct(angle_ - predicted), angle_weight_.asDiagonal() * slope});
-  }
-  return result;
-}
-
-MatrixXd RunResidual::linear_rows(const VectorXd& theta) const {
-  RunResidual free = *this;
-  free.set_motion_prior({});
-  return compress(free.solve_rows(free.linearise(theta, Partials::none)));
-}
-
 void RunResidual::set_motion_prior(const MatrixXd& rows) {
   motion_prior_ = MatrixXd::Zero(rows.rows(), unknowns_ + 1);
   if (rows.rows() > 0) motion_prior_.leftCols(unknowns_) = rows;
   prepare_angle_rows();
-}
-
-namespace {
-
-/// Least squares over the leading columns; columns that the rows do not determine get the solution of least norm.
-VectorXd least_squares(const MatrixXd& rows) {
-  const Index n = rows.cols() - 1;
-  const VectorXd scale = rows.leftCols(n).colwise().norm().cwiseMax(1e-300).transpose();
-  const MatrixXd scaled = rows.leftCols(n) * scale.cwiseInverse().asDiagonal();
-  const Eigen::HouseholderQR<MatrixXd> qr(scaled);
-  const VectorXd diagonal = qr.matrixQR().diagonal().cwiseAbs();
-  constexpr double rank_tolerance = 1e-11;
-  VectorXd c;
-  if (rows.rows() >= n && diagonal.minCoeff() > rank_tolerance) {
-    c = qr.solve(rows.col(n));
-  } else {
-    Eigen::CompleteOrthogonalDecomposition<MatrixXd> cod;
-    cod.setThreshold(rank_tolerance);
-    cod.compute(scaled);
-    c = cod.solve(rows.col(n));
-  }
-  return c.cwiseQuotient(scale);
-}
-
-}  // namespace
-
-RunResidual::Evaluation RunResidual::evaluate(const VectorXd& theta, Partials partials) const {
-  const Linearised lin = linearise(theta, partials);
-  const MatrixXd rows = solve_rows(lin);
-  Evaluation result;
-  result.linear = least_squares(rows);
-  const VectorXd residual = rows.col(unknowns_) - rows.leftCols(unknowns_) * result.linear;
-  result.chi2 = residual.squaredNorm();
-  const auto parameters = static_cast<Index>(model_->parameters().size());
-  result.residual = VectorXd::Zero(parameters + 1);
-  if (partials == Partials::none) {
-    result.residual[parameters] = std::sqrt(result.chi2);
-    return result;
-  }
-
-  // d y / d theta at fixed c, weighted, segment by segment; then project out what c can follow.
-  DualMatrix state(MatrixXd::Zero(lin.system.states(), 1), parameters);
-  state.value.col(0).head(free_states_) = result.linear.segment(first_state_, free_states_);
-  VectorXd jerk;
-  if (motion_.unknowns() > 0) jerk = motion_of(motion_.coefficients(result.linear.head(motion_.unknowns())), run_->dt).jerk;
-  std::vector<MatrixXd> blocks;
-  for (const Segment& segment : segments_) {
-    const Interval s{segment.samples.first, std::min(segment.samples.last, last_sample_)};
-    if (s.length() <= 0) break;
-    const Response response = segment.moving
-                                  ? drive(lin.system, lin.step, state, s.length(), jerk.segment(s.first, s.length()), {}, Partials::all)
-                                  : coast(lin.system, lin.step, state, s.length(), Partials::all);
-    state = response.end;
-    for (Index c = 0; c < measured_.cols(); ++c) {
-      const auto w = weight_.col(c).segment(s.first, s.length());
-      MatrixXd slopes = MatrixXd::Zero(s.length(), parameters + 1);  // last column: the residual itself
-      for (Index j = 0; j < parameters; ++j) {
-        const auto index = static_cast<std::size_t>(j);
-        if (index < response.partial.size() && response.partial[index].size() > 0) slopes.col(j) -= response.partial[index].col(c);
-        if (index < lin.known.partial.size() && lin.known.partial[index].size() > 0) slopes.col(j) -= lin.known.partial[index].col(c).segment(s.first, s.length());
-      }
-      VectorXd predicted = response.output.col(c).array() + result.linear[first_offset_ + c];
-      if (lin.known.output.size() > 0) predicted += lin.known.output.col(c).segment(s.first, s.length());
-      slopes.col(parameters) = measured_.col(c).segment(s.first, s.length()) - predicted;
-      const MatrixXd weighted = w.asDiagonal() * slopes;
-
-      // The same rows again, now with what c does beside what theta does.
-      MatrixXd stacked;
-      if (segment.moving) {
-        MatrixXd columns = MatrixXd::Zero(s.length(), unknowns_);
-        columns.leftCols(motion_.unknowns()) = motion_output_columns(lin, c, s);
-        columns.col(first_offset_ + c).setOnes();
-        stacked.resize(s.length(), unknowns_ + parameters + 1);
-        stacked << w.asDiagonal() * columns, weighted;
-      } else {
-        const Index states = lin.system.states();
-        const MatrixXd start = segment_start(lin, s);
-        MatrixXd m(s.length(), states + 1 + parameters + 1);
-        m.leftCols(states) = w.asDiagonal() * lin.free[static_cast<std::size_t>(c)].topRows(s.length());
-        m.col(states) = w;
-        m.rightCols(parameters + 1) = weighted;
-        m = compress(std::move(m));
-        stacked = MatrixXd::Zero(m.rows(), unknowns_ + parameters + 1);
-        stacked.leftCols(unknowns_).noalias() = m.leftCols(states) * start;
-        stacked.col(first_offset_ + c) += m.col(states);
-        stacked.rightCols(parameters + 1) = m.rightCols(parameters + 1);
-      }
-      blocks.push_back(std::move(stacked));
-    }
-  }
-  for (const MatrixXd& block : angle_rows_) {
-    MatrixXd stacked = MatrixXd::Zero(block.rows(), unknowns_ + parameters + 1);
-    stacked.leftCols(unknowns_) = block.leftCols(unknowns_);
-    stacked.col(unknowns_ + parameters) = block.col(unknowns_) - block.leftCols(unknowns_) * result.linear;
-    blocks.push_back(std::move(stacked));
-  }
-  Index total = 0;
-  for (const MatrixXd& block : blocks) total += block.rows();
-  MatrixXd stack(total, unknowns_ + parameters + 1);
-  Index row = 0;
-  for (const MatrixXd& block : blocks) {
-    stack.middleRows(row, block.rows()) = block;
-    row += block.rows();
-  }
-  const MatrixXd triangle = compress(std::move(stack));
-  const Index left = std::min(triangle.rows() - unknowns_, parameters + 1);
-  result.jacobian = MatrixXd::Zero(parameters + 1, parameters);
-  if (left >= 0) {
-    const auto factor = triangle.topLeftCorner(unknowns_, unknowns_).triangularView<Eigen::Upper>();
-    result.linear_factor = factor;
-    result.linear_slope = factor.solve(triangle.block(0, unknowns_, unknowns_, parameters));
-  }
-  if (left > 0) {
-    result.jacobian.topRows(left) = triangle.block(unknowns_, unknowns_, left, parameters);
-    result.residual.head(left) = triangle.block(unknowns_, unknowns_ + parameters, left, 1);
-  }
-  return result;
-}
-
-RunResidual::Prediction RunResidual::predict(const VectorXd& theta) const {
-  const Linearised lin = linearise(theta, Partials::none);
-  const MatrixXd rows = solve_rows(lin);
-  Prediction p;
-  p.channels = channels_;
-  p.linear = least_squares(rows);
-  p.linear_factor = compress(rows).topLeftCorner(std::min(rows.rows(), unknowns_), unknowns_);
-  p.offset = p.linear.segment(first_offset_, measured_.cols());
-  p.initial_state = p.linear.segment(first_state_, free_states_);
-  if (angle_offset_ >= 0) p.angle_offset = p.linear.segment(angle_offset_, 1);
-  if (motion_.unknowns() > 0) p.motion = motion_of(motion_.coefficients(p.linear.head(motion_.unknowns())), run_->dt);
-  p.output.resize(run_->samples(), measured_.cols());
-  DualMatrix state(MatrixXd::Zero(lin.system.states(), 1));
-  state.value.col(0).head(free_states_) = p.initial_state;
-  for (const Segment& segment : segments_) {
-    const Interval& s = segment.samples;
-    const Response response = segment.moving ? drive(lin.system, lin.step, state, s.length(), p.motion.jerk.segment(s.first, s.length()), {}, Partials::none)
-                                             : coast(lin.system, lin.step, state, s.length(), Partials::none);
-    state = response.end;
-    p.output.middleRows(s.first, s.length()) = response.output;
-  }
-  if (lin.known.output.size() > 0) p.output += lin.known.output;
-  p.output.rowwise() += p.offset.transpose();
-  return p;
 }
 
 RunResidual RunResidual::with_motion(std::vector<MotionBasis::Window> windows) const {

@@ -1,5 +1,6 @@
 #pragma once
 #include <Eigen/Core>
+#include <memory>
 #include <string>
 #include <vector>
 
@@ -39,6 +40,17 @@ class RunResidual {
     Eigen::MatrixXd linear_factor;  ///< R with R^T R the information matrix of c at fixed theta, empty for Partials::none
   };
   Evaluation evaluate(const Eigen::VectorXd& theta, Partials partials) const;
+
+  /// The same in two steps, for solvers that want the derivative only where the value was good: everything that the value needed is kept.
+  struct Linearised;
+  struct Solution {
+    Eigen::VectorXd theta;
+    double chi2 = 0;
+    Eigen::VectorXd linear;  ///< c
+    std::shared_ptr<const Linearised> model;
+  };
+  Solution solve(const Eigen::VectorXd& theta) const;
+  Evaluation differentiate(const Solution& solution) const;
 
   /// The fitted channels over the whole record, at theta and the c that belongs to it.
   struct Prediction {
@@ -105,10 +117,13 @@ class RunResidual {
     Interval samples;
     bool moving;
   };
-  struct Linearised;
-  Linearised linearise(const Eigen::VectorXd& theta, Partials partials) const;
-  Eigen::MatrixXd solve_rows(const Linearised& lin) const;
-  Eigen::MatrixXd motion_state_columns(const Eigen::MatrixXd& states, const Eigen::MatrixXd& summed, Eigen::Index sample) const;
+  std::shared_ptr<Linearised> linearise(const Eigen::VectorXd& theta) const;
+  void stack_rows(Linearised& lin) const;
+  template <class Take>
+  void follow_partials(const Eigen::VectorXd& theta, const Eigen::VectorXd& linear, Take take) const;
+  LinearSystem differentiable_system(const Eigen::VectorXd& theta) const;
+  Eigen::MatrixXd motion_state_columns(const Linearised& lin, Eigen::Index sample) const;
+  Interval counted(const Segment& segment) const;
   Eigen::MatrixXd motion_output_columns(const Linearised& lin, Eigen::Index channel, const Interval& samples) const;
   Eigen::MatrixXd segment_start(const Linearised& lin, const Interval& samples) const;
   void prepare_angle_rows();

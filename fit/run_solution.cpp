@@ -1,0 +1,404 @@
+#include <Eigen/QR>
+#include <algorithm>
+#include <cmath>
+
+#include "fit/run_residual.h"
+
+// The arithmetic behind RunResidual: rows of the linear unknowns, their elimination, and what theta does beside them.
+
+namespace unrig {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::RowVectorXd;
+using Eigen::VectorXd;
+
+namespace {
+
+/// The upper triangular (or trapezoidal) factor of `rows`: the same inner products in no more rows than columns.
+MatrixXd compress(MatrixXd rows) {
+  const Eigen::HouseholderQR<Eigen::Ref<MatrixXd>> qr(rows);  // in place
+  return rows.topRows(std::min(rows.rows(), rows.cols())).triangularView<Eigen::Upper>();
+}
+
+MatrixXd stacked(const std::vector<MatrixXd>& blocks, Index columns) {
+  Index total = 0;
+  for (const MatrixXd& block : blocks) total += block.rows();
+  MatrixXd stack(total, columns);
+  Index row = 0;
+  for (const MatrixXd& block : blocks) {
+    stack.middleRows(row, block.rows()) = block;
+    row += block.rows();
+  }
+  return stack;
+}
+
+/// Least squares by column-scaled QR. Columns that the rows do not determine (a state that no channel sees) are left at zero.
+class Eliminator {
+ public:
+  explicit Eliminator(const MatrixXd& columns) : scale_(columns.colwise().norm().transpose().cwiseMax(1e-300).cwiseInverse()) {
+    constexpr double rank_tolerance = 1e-11;
+    const MatrixXd scaled = columns * scale_.asDiagonal();
+    quick_.compute(scaled);
+    if (columns.rows() >= columns.cols() && (columns.cols() == 0 || quick_.matrixQR().diagonal().cwiseAbs().minCoeff() > rank_tolerance)) return;
+    pivoted_.setThreshold(rank_tolerance);
+    pivoted_.compute(scaled);
+    deficient_ = true;
+  }
+  Index rank() const { return deficient_ ? pivoted_.rank() : scale_.size(); }
+  /// Coordinates of `rows` in the columns' space (the first `rank` rows) and beside it.
+  MatrixXd rotated(const MatrixXd& rows) const {
+    return deficient_ ? MatrixXd(pivoted_.householderQ().setLength(pivoted_.rank()).adjoint() * rows) : MatrixXd(quick_.householderQ().adjoint() * rows);
+  }
+  /// Solution of R x = rotated, back in the columns' own scale.
+  MatrixXd solve(const MatrixXd& rotated) const {
+    const Index r = rank();
+    MatrixXd x = MatrixXd::Zero(scale_.size(), rotated.cols());
+    if (deficient_) {
+      x.topRows(r) = pivoted_.matrixQR().topLeftCorner(r, r).triangularView<Eigen::Upper>().solve(rotated.topRows(r));
+      x = pivoted_.colsPermutation() * x;
+    } else {
+      x = quick_.matrixQR().topLeftCorner(r, r).triangularView<Eigen::Upper>().solve(rotated.topRows(r));
+    }
+    return scale_.asDiagonal() * x;
+  }
+  /// R with R^T R = the columns' information matrix. Only where all columns are determined is it regular.
+  MatrixXd factor() const {
+    const Index n = scale_.size();
+    MatrixXd r = MatrixXd::Zero(n, n);
+    if (deficient_) {
+      const Index k = rank();
+      MatrixXd permuted = MatrixXd::Zero(n, n);
+      permuted.topRows(k) = MatrixXd(pivoted_.matrixQR().topRows(k).triangularView<Eigen::Upper>());
+      r = permuted * pivoted_.colsPermutation().transpose();
+      r = compress(r);
+    } else {
+      r = quick_.matrixQR().topRows(n).triangularView<Eigen::Upper>();
+    }
+    return r * scale_.cwiseInverse().asDiagonal();
+  }
+
+ private:
+  VectorXd scale_;
+  Eigen::HouseholderQR<MatrixXd> quick_;
+  Eigen::ColPivHouseholderQR<MatrixXd> pivoted_;
+  bool deficient_ = false;
+};
+
+}  // namespace
+
+/// The model at one theta, without partials: its exact step, what the inputs alone do, where the unknown motion takes the states, and the rows
+/// of the linear unknowns.
+struct RunResidual::Linearised {
+  LinearSystem system;
+  ExactStep step;
+  MatrixXd known;          // response to the measured inputs, samples x channels, empty without
+  MatrixXd spline;         // states after a unit spline, n x samples
+  MatrixXd spline_summed;  // and their running sum: states after splines at every sample
+  std::vector<MatrixXd> free;  // rows of the free response per channel, for the longest segment at rest
+
+  /// One channel over one segment. A segment at rest spans only the free response and the offset: `at_rest` rotates its rows so that the first
+  /// `kept` of them hold all that c can reach, and the others only what is left.
+  struct Block {
+    Interval samples;
+    bool moving = false;
+    Index channel = 0, kept = 0;
+    std::shared_ptr<const Eigen::HouseholderQR<MatrixXd>> at_rest;
+
+    /// Weighted rows of this block: those that c reaches, and the others.
+    std::pair<MatrixXd, MatrixXd> split(MatrixXd rows) const {
+      if (moving) return {std::move(rows), MatrixXd()};
+      rows.applyOnTheLeft(at_rest->householderQ().adjoint());
+      return {rows.topRows(kept), rows.bottomRows(rows.rows() - kept)};
+    }
+  };
+  std::vector<Block> blocks;
+  std::unique_ptr<Eliminator> eliminate;
+  VectorXd linear;
+  double chi2 = 0;
+};
+
+Interval RunResidual::counted(const Segment& segment) const { return {segment.samples.first, std::min(segment.samples.last, last_sample_)}; }
+
+std::shared_ptr<RunResidual::Linearised> RunResidual::linearise(const VectorXd& theta) const {
+  auto lin = std::make_shared<Linearised>();
+  lin->system = model_->system(conditions_, theta, channels_);
+  for (DualMatrix* m : {&lin->system.A, &lin->system.B, &lin->system.C, &lin->system.D}) m->partial.clear();
+  lin->step = exact_step(lin->system, run_->dt);
+  if (inputs_.cols() > 0)
+    lin->known = drive(lin->system, lin->step, DualMatrix(MatrixXd::Zero(lin->system.states(), 1)), run_->samples(), {}, inputs_, Partials::none).output;
+  Index longest = 0, last_motion = 0;
+  for (const Segment& s : segments_) {
+    if (s.moving) last_motion = s.samples.last;
+    if (!s.moving) longest = std::max(longest, counted(s).length());
+  }
+  lin->free = free_response_rows(lin->system, lin->step, longest);
+  if (motion_.unknowns() > 0) {
+    lin->spline = spline_states(lin->step, last_motion + 1 - motion_.columns().front().first);
+    lin->spline_summed = lin->spline;
+    for (Index k = 1; k < lin->spline.cols(); ++k) lin->spline_summed.col(k) += lin->spline_summed.col(k - 1);
+  }
+  return lin;
+}
+
+/// d output / d motion unknowns over a segment in which the shaft moves: the response to one spline, shifted.
+MatrixXd RunResidual::motion_output_columns(const Linearised& lin, Index channel, const Interval& samples) const {
+  const RowVectorXd unit = lin.system.C.value.row(channel) * lin.spline, summed = lin.system.C.value.row(channel) * lin.spline_summed;
+  MatrixXd columns = MatrixXd::Zero(samples.length(), motion_.unknowns());
+  for (Index j = 0; j < motion_.unknowns(); ++j) {
+    const MotionBasis::Column& column = motion_.columns()[static_cast<std::size_t>(j)];
+    const auto add = [&](const RowVectorXd& response, Index knot, double amount) {
+      const Index from = std::max(samples.first, knot + 1);
+      if (amount == 0 || from >= samples.last) return;
+      columns.col(j).tail(samples.last - from) += amount * response.segment(from - knot, samples.last - from).transpose();
+    };
+    for (Index i = 0; i < column.value.size(); ++i) add(unit, column.first + i, column.value[i]);
+    add(summed, column.first + column.value.size(), column.tail);
+  }
+  return columns;
+}
+
+/// d state / d motion unknowns at `sample`.
+MatrixXd RunResidual::motion_state_columns(const Linearised& lin, Index sample) const {
+  MatrixXd columns = MatrixXd::Zero(lin.spline.rows(), motion_.unknowns());
+  for (Index j = 0; j < motion_.unknowns(); ++j) {
+    const MotionBasis::Column& column = motion_.columns()[static_cast<std::size_t>(j)];
+    for (Index i = 0; i < column.value.size(); ++i) {
+      const Index since = sample - column.first - i;
+      if (since <= 0) break;
+      columns.col(j) += column.value[i] * lin.spline.col(since);
+    }
+    const Index since_tail = sample - column.first - column.value.size();
+    if (column.tail != 0 && since_tail > 0) columns.col(j) += column.tail * lin.spline_summed.col(since_tail);
+  }
+  return columns;
+}
+
+/// d state / d c at the first sample of a segment.
+MatrixXd RunResidual::segment_start(const Linearised& lin, const Interval& samples) const {
+  MatrixXd start = MatrixXd::Zero(lin.system.states(), unknowns_);
+  if (motion_.unknowns() > 0) start.leftCols(motion_.unknowns()) = motion_state_columns(lin, samples.first);
+  if (free_states_ > 0 && samples.first == 0) start.block(0, first_state_, free_states_, free_states_).setIdentity();
+  return start;
+}
+
+/// All rows [c | y], those of segments at rest rotated and cut to what c can reach; solves for c.
+void RunResidual::stack_rows(Linearised& lin) const {
+  const Index states = lin.system.states();
+  std::vector<MatrixXd> rows;
+  double unreachable = 0;
+  for (const Segment& segment : segments_) {
+    const Interval s = counted(segment);
+    const Index length = s.length();
+    if (length <= 0) break;
+    const MatrixXd start = segment.moving ? MatrixXd() : segment_start(lin, s);
+    for (Index c = 0; c < measured_.cols(); ++c) {
+      const auto w = weight_.col(c).segment(s.first, length);
+      VectorXd y = measured_.col(c).segment(s.first, length);
+      if (lin.known.size() > 0) y -= lin.known.col(c).segment(s.first, length);
+      y = w.cwiseProduct(y);
+      Linearised::Block block{s, segment.moving, c, length, nullptr};
+      MatrixXd reach;
+      if (segment.moving) {
+        reach = MatrixXd::Zero(length, unknowns_);
+        reach.leftCols(motion_.unknowns()) = motion_output_columns(lin, c, s);
+        reach.col(first_offset_ + c).setOnes();
+        reach = w.asDiagonal() * reach;
+      } else {
+        MatrixXd span(length, states + 1);
+        span.leftCols(states) = w.asDiagonal() * lin.free[static_cast<std::size_t>(c)].topRows(length);
+        span.col(states) = w;
+        block.kept = std::min(length, states + 1);
+        const auto qr = std::make_shared<const Eigen::HouseholderQR<MatrixXd>>(std::move(span));
+        block.at_rest = qr;
+        const MatrixXd triangle = qr->matrixQR().topRows(block.kept).triangularView<Eigen::Upper>();
+        reach = triangle.leftCols(states) * start;
+        reach.col(first_offset_ + c) += triangle.col(states);
+      }
+      const auto [reached, others] = block.split(std::move(y));
+      unreachable += others.squaredNorm();
+      MatrixXd together(reach.rows(), unknowns_ + 1);
+      together << reach, reached;
+      rows.push_back(std::move(together));
+      lin.blocks.push_back(std::move(block));
+    }
+  }
+  rows.insert(rows.end(), angle_rows_.begin(), angle_rows_.end());
+  const MatrixXd stack = stacked(rows, unknowns_ + 1);
+  lin.eliminate = std::make_unique<Eliminator>(stack.leftCols(unknowns_));
+  const MatrixXd rotated = lin.eliminate->rotated(stack.rightCols(1));
+  lin.linear = lin.eliminate->solve(rotated);
+  lin.chi2 = unreachable + rotated.bottomRows(rotated.rows() - lin.eliminate->rank()).squaredNorm();
+}
+
+RunResidual::Solution RunResidual::solve(const VectorXd& theta) const {
+  const std::shared_ptr<Linearised> lin = linearise(theta);
+  stack_rows(*lin);
+  return {theta, lin->chi2, lin->linear, lin};
+}
+
+LinearSystem RunResidual::differentiable_system(const VectorXd& theta) const {
+  LinearSystem system = model_->system(conditions_, theta, channels_);
+  if (differentiated_.empty()) return system;
+  for (DualMatrix* m : {&system.A, &system.B, &system.C, &system.D})
+    for (Index j = 0; j < m->parameters(); ++j)
+      if (std::find(differentiated_.begin(), differentiated_.end(), j) == differentiated_.end()) m->partial[static_cast<std::size_t>(j)].resize(0, 0);
+  return system;
+}
+
+namespace {
+
+/// What the parameters do to one channel over a segment at fixed c, beside its prediction: [d y / d theta | y].
+MatrixXd slopes_and_prediction(const Response& response, const Response& known, const Interval& s, Index channel, Index parameters) {
+  MatrixXd m = MatrixXd::Zero(s.length(), parameters + 1);
+  m.col(parameters) = response.output.col(channel);
+  if (known.output.size() > 0) m.col(parameters) += known.output.col(channel).segment(s.first, s.length());
+  for (Index j = 0; j < parameters; ++j) {
+    const auto index = static_cast<std::size_t>(j);
+    if (index < response.partial.size() && response.partial[index].size() > 0) m.col(j) += response.partial[index].col(channel);
+    if (index < known.partial.size() && known.partial[index].size() > 0) m.col(j) += known.partial[index].col(channel).segment(s.first, s.length());
+  }
+  return m;
+}
+
+}  // namespace
+
+/// Follows the model with its partials through all segments at fixed c, and hands [d y / d theta | y] of each channel and segment to `take`.
+template <class Take>
+void RunResidual::follow_partials(const VectorXd& theta, const VectorXd& linear, Take take) const {
+  const LinearSystem system = differentiable_system(theta);
+  const ExactStep step = exact_step(system, run_->dt);
+  const auto parameters = static_cast<Index>(model_->parameters().size());
+  Response known;
+  if (inputs_.cols() > 0) known = drive(system, step, DualMatrix(MatrixXd::Zero(system.states(), 1)), run_->samples(), {}, inputs_, Partials::all);
+  DualMatrix state(MatrixXd::Zero(system.states(), 1), parameters);
+  state.value.col(0).head(free_states_) = linear.segment(first_state_, free_states_);
+  VectorXd jerk;
+  if (motion_.unknowns() > 0) jerk = motion_of(motion_.coefficients(linear.head(motion_.unknowns())), run_->dt).jerk;
+  for (const Segment& segment : segments_) {
+    const Interval s = counted(segment);
+    if (s.length() <= 0) break;
+    const Response response = segment.moving ? drive(system, step, state, s.length(), jerk.segment(s.first, s.length()), {}, Partials::all)
+                                             : coast(system, step, state, s.length(), Partials::all);
+    state = response.end;
+    for (Index c = 0; c < measured_.cols(); ++c) {
+      MatrixXd m = slopes_and_prediction(response, known, s, c, parameters);
+      m.col(parameters).array() += linear[first_offset_ + c];
+      take(segment, s, c, std::move(m));
+    }
+  }
+}
+
+RunResidual::Evaluation RunResidual::differentiate(const Solution& solution) const {
+  const Linearised& lin = *solution.model;
+  const auto parameters = static_cast<Index>(model_->parameters().size());
+  std::vector<MatrixXd> reached, others;
+  std::size_t next = 0;
+  follow_partials(solution.theta, solution.linear, [&](const Segment&, const Interval& s, Index c, MatrixXd m) {
+    // Residual and its derivative, weighted: [-d y / d theta | measured - y].
+    m = -m;
+    m.col(parameters) += measured_.col(c).segment(s.first, s.length());
+    auto [top, bottom] = lin.blocks[next++].split(weight_.col(c).segment(s.first, s.length()).asDiagonal() * m);
+    reached.push_back(std::move(top));
+    if (bottom.rows() > 0) others.push_back(compress(std::move(bottom)));
+  });
+  for (const MatrixXd& rows : angle_rows_) {
+    MatrixXd m = MatrixXd::Zero(rows.rows(), parameters + 1);
+    m.col(parameters) = rows.col(unknowns_) - rows.leftCols(unknowns_) * solution.linear;
+    reached.push_back(std::move(m));
+  }
+  const MatrixXd rotated = lin.eliminate->rotated(stacked(reached, parameters + 1));
+  const Index rank = lin.eliminate->rank();
+  others.push_back(rotated.bottomRows(rotated.rows() - rank));
+  const MatrixXd triangle = compress(stacked(others, parameters + 1));
+
+  Evaluation e;
+  e.linear = solution.linear;
+  e.linear_factor = lin.eliminate->factor();
+  e.linear_slope = lin.eliminate->solve(rotated.leftCols(parameters));
+  e.residual = VectorXd::Zero(parameters + 1);
+  e.jacobian = MatrixXd::Zero(parameters + 1, parameters);
+  e.jacobian.topRows(triangle.rows()) = triangle.leftCols(parameters);
+  e.residual.head(triangle.rows()) = triangle.col(parameters);
+  e.chi2 = e.residual.squaredNorm();
+  return e;
+}
+
+RunResidual::Evaluation RunResidual::evaluate(const VectorXd& theta, Partials partials) const {
+  const Solution solution = solve(theta);
+  if (partials == Partials::all) return differentiate(solution);
+  const auto parameters = static_cast<Index>(model_->parameters().size());
+  Evaluation e;
+  e.chi2 = solution.chi2;
+  e.residual = VectorXd::Zero(parameters + 1);
+  e.residual[parameters] = std::sqrt(e.chi2);
+  e.linear = solution.linear;
+  return e;
+}
+
+RunResidual::Prediction RunResidual::predict(const VectorXd& theta) const {
+  const Solution solution = solve(theta);
+  const Linearised& lin = *solution.model;
+  Prediction p;
+  p.channels = channels_;
+  p.linear = solution.linear;
+  p.linear_factor = lin.eliminate->factor();
+  p.offset = p.linear.segment(first_offset_, measured_.cols());
+  p.initial_state = p.linear.segment(first_state_, free_states_);
+  if (angle_offset_ >= 0) p.angle_offset = p.linear.segment(angle_offset_, 1);
+  if (motion_.unknowns() > 0) p.motion = motion_of(motion_.coefficients(p.linear.head(motion_.unknowns())), run_->dt);
+  p.output.resize(run_->samples(), measured_.cols());
+  DualMatrix state(MatrixXd::Zero(lin.system.states(), 1));
+  state.value.col(0).head(free_states_) = p.initial_state;
+  for (const Segment& segment : segments_) {
+    const Interval& s = segment.samples;
+    const Response response = segment.moving ? drive(lin.system, lin.step, state, s.length(), p.motion.jerk.segment(s.first, s.length()), {}, Partials::none)
+                                             : coast(lin.system, lin.step, state, s.length(), Partials::none);
+    state = response.end;
+    p.output.middleRows(s.first, s.length()) = response.output;
+  }
+  if (lin.known.size() > 0) p.output += lin.known;
+  p.output.rowwise() += p.offset.transpose();
+  return p;
+}
+
+RunResidual::Sensitivity RunResidual::sensitivity(const VectorXd& theta) const {
+  const Solution solution = solve(theta);
+  const Linearised& lin = *solution.model;
+  const Evaluation e = differentiate(solution);
+  const auto parameters = static_cast<Index>(model_->parameters().size());
+  const Index n = run_->samples();
+  Sensitivity result;
+  result.channels.assign(static_cast<std::size_t>(measured_.cols()), {VectorXd::Zero(n), MatrixXd::Zero(n, parameters)});
+  follow_partials(theta, solution.linear, [&](const Segment& segment, const Interval& s, Index c, MatrixXd m) {
+    // c follows theta: the motion through the states, the offset as it is.
+    const MatrixXd follow = segment.moving ? MatrixXd(motion_output_columns(lin, c, s) * e.linear_slope.topRows(motion_.unknowns()))
+                                           : MatrixXd(lin.free[static_cast<std::size_t>(c)].topRows(s.length()) * (segment_start(lin, s) * e.linear_slope));
+    m.leftCols(parameters) += follow;
+    m.leftCols(parameters).rowwise() += e.linear_slope.row(first_offset_ + c);
+    m.col(parameters) = measured_.col(c).segment(s.first, s.length()) - m.col(parameters);
+    const MatrixXd weighted = weight_.col(c).segment(s.first, s.length()).asDiagonal() * m;
+    result.channels[static_cast<std::size_t>(c)].residual.segment(s.first, s.length()) = weighted.col(parameters);
+    result.channels[static_cast<std::size_t>(c)].slope.middleRows(s.first, s.length()) = weighted.leftCols(parameters);
+  });
+  if (angle_offset_ >= 0) {
+    const MatrixXd columns = motion_.angle_columns({0, n});
+    const VectorXd predicted = (columns * e.linear.head(motion_.unknowns())).array() + e.linear[angle_offset_];
+    MatrixXd slope = columns * e.linear_slope.topRows(motion_.unknowns());
+    slope.rowwise() += e.linear_slope.row(angle_offset_);
+    result.channels.push_back({angle_weight_.cwiseProduct(angle_ - predicted), angle_weight_.asDiagonal() * slope});
+  }
+  return result;
+}
+
+MatrixXd RunResidual::linear_rows(const VectorXd& theta) const {
+  RunResidual free = *this;
+  free.set_motion_prior({});
+  const Solution solution = free.solve(theta);
+  MatrixXd rows(unknowns_, unknowns_ + 1);
+  const MatrixXd factor = solution.model->eliminate->factor();
+  rows << factor, factor * solution.linear;
+  return rows;
+}
+
+}  // namespace unrig
