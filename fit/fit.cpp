@@ -147,6 +147,7 @@ JointProblem arrive(const AeroelasticModel& model, const FitProblem& problem, co
 bool widen_motion(JointProblem& joint, const std::vector<Run>& runs, Windows& windows) {
   bool widened = false;
   for (std::size_t r = 0; r < runs.size(); ++r) {
+    double before = -1;  // chi-square with the present windows, once it is known
     for (std::size_t w = 0; w < windows[r].size(); ++w) {
       const Interval knots = windows[r][w].knots;
       const Index more = std::max<Index>(10, knots.length() / 4);
@@ -162,12 +163,13 @@ bool widen_motion(JointProblem& joint, const std::vector<Run>& runs, Windows& wi
         RunResidual wider = joint.runs()[r].with_motion(trial);
         const VectorXd theta = joint.theta(r);
         wider.reject_spikes(theta);
-        const double before = joint.runs()[r].evaluate(theta, Partials::none).chi2;
+        if (!(before >= 0)) before = joint.runs()[r].solve(theta).chi2;
         const double scale = std::max(1.0, before / static_cast<double>(joint.runs()[r].degrees_of_freedom()));
-        const double gain = (before - wider.evaluate(theta, Partials::none).chi2) / scale;
+        const double gain = (before - wider.solve(theta).chi2) / scale;
         if (gain < added + 4 * std::sqrt(2 * added)) continue;  // four standard deviations of chi-square with that many degrees
         windows[r] = trial;
         joint.runs()[r] = std::move(wider);
+        before = -1;
         widened = true;
       }
     }
@@ -180,9 +182,11 @@ void refine_motion(JointProblem& joint, const FitProblem& problem, Windows& wind
   for (int round = 0; round < rounds; ++round) {
     Index rejected = 0;
     for (std::size_t r = 0; r < joint.runs().size(); ++r) rejected += joint.runs()[r].reject_spikes(joint.theta(r));
-    if (!widen_motion(joint, problem.runs, windows) && rejected == 0 && round > 0) break;
+    const bool changed = widen_motion(joint, problem.runs, windows) || rejected > 0;
+    if (!changed && round > 0) break;
     tell(problem, "refining the motion");
-    solve(joint, result);
+    solve(joint, result);  // the first time for the noise levels' sake
+    if (!changed) break;
   }
 }
 
