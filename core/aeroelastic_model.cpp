@@ -2,11 +2,14 @@
 
 #include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 #include <stdexcept>
 
 #include <fmt/format.h>
+
+#include "core/effects/effect.h"
 
 namespace unrig {
 namespace {
@@ -88,7 +91,7 @@ RowVectorXd gauge_arms(const Rig& rig) {
 /// Column positions of the extended coordinates' displacement, rate and acceleration in the state and the inputs.
 /// Prescribed coordinates have theirs in the motion states (pitch) and in the inputs (heave).
 struct Layout {
-  Index coordinates, lags, motion, states, inputs, force = -1, mount = -1;
+  Index coordinates, lags, motion, states, inputs, force = -1, mount = -1, strip_force = -1;
 };
 
 Layout layout_of(Index coordinates, Index lags, const Conditions& conditions) {
@@ -102,6 +105,7 @@ Layout layout_of(Index coordinates, Index lags, const Conditions& conditions) {
     l.mount = l.inputs;
     l.inputs += 2;
   }
+  if (conditions.strip_force) l.strip_force = l.inputs++;
   return l;
 }
 
@@ -220,7 +224,38 @@ std::vector<std::string> AeroelasticModel::output_channels(const Run& run) const
 }
 
 LinearSystem AeroelasticModel::system(const Conditions& conditions, const VectorXd& theta, const std::vector<std::string>& channels) const {
-  return rig_.is_modal() ? modal_system(conditions, theta, channels) : beam_system(conditions, theta, channels);
+  if (rig_.is_modal()) return modal_system(conditions, theta, channels);
+  if (effects_.empty()) return beam_system(conditions, theta, channels);
+
+  Conditions with_port = conditions;
+  with_port.strip_force = true;
+  LinearSystem system = beam_system(with_port, theta, channels);
+  const Index port = system.B.cols() - 1;
+  const auto gauge = std::find(channels.begin(), channels.end(), "gauge");
+  Index first = theta.size();
+  for (const std::string& id : effects_) first -= static_cast<Index>(effect(id).parameters.size());
+  for (const std::string& id : effects_) {
+    const Effect& e = effect(id);
+    const EffectContext context{*this, conditions, theta, first, gauge == channels.end() ? Index{-1} : gauge - channels.begin(), port};
+    if (e.acts(conditions)) e.apply(system, context);
+    first += static_cast<Index>(e.parameters.size());
+  }
+  system.B = system.B.block(0, 0, system.B.rows(), port);
+  system.D = system.D.block(0, 0, system.D.rows(), port);
+  return system;
+}
+
+AeroelasticModel AeroelasticModel::with_effects(const std::vector<std::string>& ids) const {
+  if (rig_.is_modal()) throw std::invalid_argument("a rig known only as modes has no place for effects yet");
+  AeroelasticModel model = *this;
+  for (const std::string& id : ids) {
+    for (Parameter p : effect(id).parameters) {
+      p.name = id + "." + p.name;
+      model.parameters_.push_back(p);
+    }
+    model.effects_.push_back(id);
+  }
+  return model;
 }
 
 LinearSystem AeroelasticModel::beam_system(const Conditions& conditions, const VectorXd& theta, const std::vector<std::string>& channels) const {
@@ -287,6 +322,8 @@ LinearSystem AeroelasticModel::beam_system(const Conditions& conditions, const V
   force.add_prescribed_acceleration(-inertia.topRows(n));
   force.dual.add_partial(apparent_mass, -force.prescribed_acceleration(wet.topRows(n)));
   if (layout.force >= 0) force.dual.value.col(layout.states + layout.force) += normal_n.row(rig_.calibration_element - 1).transpose();
+  const MatrixXd even = MatrixXd::Constant(1, strip_count, 1.0 / static_cast<double>(std::max<Index>(1, strip_count)));
+  if (layout.strip_force >= 0) force.dual.value.col(layout.states + layout.strip_force) += (even * strips.normal.leftCols(n)).transpose();
   const DualMatrix acceleration = solve(mass, force.dual);
 
   // State equation.
@@ -324,6 +361,7 @@ LinearSystem AeroelasticModel::beam_system(const Conditions& conditions, const V
       MatrixXd strip_arms(1, strip_count);
       for (Index s = 0; s < strip_count; ++s) strip_arms(0, s) = arms[rig_.submerged[static_cast<std::size_t>(s)] - 1];
       reading = reading + strip_arms * circulatory.dual;
+      if (layout.strip_force >= 0) reading.value(0, layout.states + layout.strip_force) += (even * strip_arms.transpose()).value();
       if (layout.force >= 0) reading.value(0, layout.states + layout.force) += arms[rig_.calibration_element - 1];
       outputs.set_block(row, 0, reading);
       continue;

@@ -29,6 +29,7 @@ struct Conditions {
   bool prescribed_pitch = false;  ///< carry angle, rate and acceleration of the shaft as states
   bool force = false;             ///< a measured force at the calibration station
   bool mount = false;             ///< the mount moves: inputs velocity and acceleration
+  bool strip_force = false;       ///< a further input, last: one newton spread evenly over the strips
 };
 
 /// The coupled model of one run as a linear state equation with exact partial derivatives in theta:
@@ -44,6 +45,8 @@ struct LinearSystem {
   Eigen::Index coordinates = 0;
   Eigen::Index lags = 0;
   Eigen::Index motion = -1;  ///< index of the state p, or -1
+  std::vector<Eigen::Index> settling;   ///< further states that are at rest where the rig is (a filter's)
+  std::vector<Eigen::Index> exogenous;  ///< further states whose initial value is unknown in every run (a signal's)
   std::vector<std::string> outputs;
 
   Eigen::Index states() const { return A.rows(); }
@@ -76,6 +79,11 @@ class AeroelasticModel {
   /// Beam rigs need a basis; modal rigs ignore it.
   AeroelasticModel(Rig rig, Basis basis, IndicialFunction circulation, Circulation build_up = Circulation::given);
 
+  /// The same rig with these effects at work (ids of core/effects/table.cpp), their parameters behind the model's own, named "id.parameter".
+  /// Throws std::invalid_argument for an id that does not exist or a rig that has no place for effects (modal).
+  AeroelasticModel with_effects(const std::vector<std::string>& ids) const;
+  const std::vector<std::string>& effect_ids() const { return effects_; }
+
   const Rig& rig() const { return rig_; }
   const Basis& basis() const { return basis_; }
   const IndicialFunction& circulation() const { return circulation_; }
@@ -104,6 +112,7 @@ class AeroelasticModel {
   IndicialFunction circulation_;
   Circulation build_up_;
   std::vector<Parameter> parameters_;
+  std::vector<std::string> effects_;
 };
 
 /// Conditions of a run: speed, density, and which inputs it has.

@@ -197,7 +197,8 @@ CorrectResult correct(const CorrectProblem& problem) {
   const VectorXd rates = rates_for(length);
   const Basis basis = problem.fit.normal_modes > 0 ? make_basis(problem.rig, problem.fit.normal_modes, problem.fit.torsion_modes)
                                                    : make_basis(problem.rig, 0.5 / run.dt, run.density);
-  const AeroelasticModel model(problem.rig, basis, {"free", wagner_amplitudes(rates, length), rates}, AeroelasticModel::Circulation::free);
+  const AeroelasticModel model =
+      AeroelasticModel(problem.rig, basis, {"free", wagner_amplitudes(rates, length), rates}, AeroelasticModel::Circulation::free).with_effects(problem.fit.effects);
   VectorXd theta = theta_for(model, problem.fit, run.file);
   const Prior prior = prior_of(model, problem.fit, theta, run.file);
 
@@ -221,7 +222,7 @@ CorrectResult correct(const CorrectProblem& problem) {
   const Index motion_unknowns = residual.motion().unknowns();
   const VectorXd u = e.linear.head(motion_unknowns);
   const RigidLoad load = rigid_load(model, residual.conditions(), theta, residual.motion(), run.dt, u);
-  const Index offset = motion_unknowns;  // the gauge comes first among the channels, and a step has no free initial state
+  const Index offset = residual.first_offset();  // the gauge comes first among the channels
   const double gauge = problem.rig.station[problem.rig.gauge_element - 1], lever = problem.rig.station[problem.rig.calibration_element - 1] - gauge;
   double arms = 0;
   for (int element : problem.rig.submerged) arms += std::max(0.0, problem.rig.station[element - 1] - gauge) / lever;

@@ -7,6 +7,7 @@
 
 #include <fmt/format.h>
 
+#include "core/effects/effect.h"
 #include "fit/first_guess.h"
 #include "fit/joint_problem.h"
 #include "fit/uncertainty.h"
@@ -107,10 +108,10 @@ double reduced_chi2(const JointProblem& joint) {
 
 /// From the rig file's values to the whole record by way of windows that grow from a few periods. Where that leaves the record unexplained, the early
 /// stages are tried once more from stiffnesses around the first guess, and the best of them goes on.
-JointProblem arrive(const AeroelasticModel& model, const FitProblem& problem, const Windows& windows, FitResult& result) {
+JointProblem arrive(const AeroelasticModel& model, const FitProblem& problem, const std::map<std::string, double>& starts, const Windows& windows, FitResult& result) {
   const std::vector<Index> horizons = growing_horizons(problem.runs);
   JointProblem start = make_joint(model, problem.runs, windows, horizons.front());
-  for (const auto& [name, value] : problem.start)
+  for (const auto& [name, value] : starts)
     for (Unknown& u : start.unknowns())
       if (start.parameter(u).name == name) u.value = value;
   hold_undetermined(start);
@@ -274,7 +275,7 @@ void add_steady_load(const RunResidual& residual, const VectorXd& theta, FitResu
   steady.unit = "1";
   steady.run = residual.run().file;
   steady.value = p.offset[0] / unit_reading;
-  const Index column = p.linear.size() - 1 - static_cast<Index>(residual.channels().size()) + (residual.motion().unknowns() > 0 ? 0 : 1);
+  const Index column = residual.first_offset();
   const VectorXd unit = VectorXd::Unit(p.linear.size(), column);
   const VectorXd half = p.linear_factor.triangularView<Eigen::Upper>().transpose().solve(unit);
   steady.std_error = half.norm() / unit_reading;
@@ -333,6 +334,54 @@ void describe_parameters(const JointProblem& joint, const Uncertainty& uncertain
 
 }  // namespace
 
+namespace {
+
+/// The fit goes on with effects at work: from the best of each effect's starts, everything else where the fit without it ended.
+JointProblem with_effects(const AeroelasticModel& model, const JointProblem& joint, const FitProblem& problem, const Windows& windows, FitResult& result) {
+  JointProblem richer = make_joint(model, problem.runs, windows, 0);
+  for (Unknown& u : richer.unknowns())
+    for (const Unknown& known : joint.unknowns())
+      if (u.parameter == known.parameter && u.run == known.run) u = known;
+  for (std::size_t r = 0; r < richer.runs().size(); ++r) richer.runs()[r].keep_noise_of(joint.runs()[r]);
+  for (const std::string& id : problem.effects) {
+    tell(problem, "looking for " + id);
+    const Effect& e = effect(id);
+    std::vector<Unknown*> own;
+    for (Unknown& u : richer.unknowns())
+      if (richer.parameter(u).name.starts_with(id + ".")) own.push_back(&u);
+    const auto set = [&](const VectorXd& values) {
+      for (std::size_t k = 0; k < own.size(); ++k) own[k]->value = values[static_cast<Index>(k)];
+    };
+    VectorXd best(static_cast<Index>(own.size()));
+    for (std::size_t k = 0; k < own.size(); ++k) best[static_cast<Index>(k)] = own[k]->value;
+    double least = richer.chi2();
+    for (const VectorXd& start : e.starts) {
+      set(start);
+      const double chi2 = richer.chi2();
+      if (chi2 < least) {
+        least = chi2;
+        best = start;
+      }
+    }
+    set(best);
+  }
+  hold_undetermined(richer);
+  solve(richer, result, {});
+  constexpr double explained = 1.3;
+  const double reached = reduced_chi2(richer);
+  if (reached < explained) return richer;
+
+  // Without the effect the rig's parameters may have gone far astray: all over again, with the effect from the first sample on.
+  std::map<std::string, double> starts = problem.start;
+  for (const Unknown& u : richer.unknowns())
+    if (const std::string& name = richer.parameter(u).name; std::any_of(problem.effects.begin(), problem.effects.end(), [&](const std::string& id) { return name.starts_with(id + "."); }))
+      starts.emplace(name, richer.parameter(u).start);
+  JointProblem other = arrive(model, problem, starts, windows, result);
+  return reduced_chi2(other) < reached ? other : richer;
+}
+
+}  // namespace
+
 double FitResult::bic() const { return chi2 + std::log(static_cast<double>(observations)) * static_cast<double>(variables); }
 
 AeroelasticModel model_of(const Rig& rig, const std::vector<Run>& runs, Wagner circulation) {
@@ -360,8 +409,11 @@ FitResult fit(const FitProblem& problem) {
     windows.push_back(problem.rig.is_modal() ? std::vector<MotionBasis::Window>{} : motion_windows(run));
     for (const std::string& warning : run.warnings) result.warnings.push_back(warning);
   }
-  JointProblem joint = arrive(model, problem, windows, result);
+  JointProblem joint = arrive(model, problem, problem.start, windows, result);
   hold_undetermined(joint);
+  const AeroelasticModel complete = problem.effects.empty() ? model : model.with_effects(problem.effects);
+  if (!problem.effects.empty()) joint = with_effects(complete, joint, problem, windows, result);
+  result.effects = problem.effects;
   const Uncertainty uncertainty = settle(joint, problem, windows, result);
 
   const JointProblem::Linearisation lin = joint.linearise();

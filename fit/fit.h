@@ -18,6 +18,7 @@ struct FitProblem {
   Rig rig;
   std::vector<Run> runs;
   Wagner circulation = Wagner::within_1e4;
+  std::vector<std::string> effects;     ///< ids of core/effects/table.cpp that are at work
   std::map<std::string, double> start;  ///< start values other than the rig file's, by parameter name
   std::function<void(const std::string&)> progress;  ///< told what is being done; empty: silent
 };
@@ -67,6 +68,7 @@ struct FitResult {
   Eigen::MatrixXd correlation;  ///< of `parameters`; zero beside the diagonal for those that were held
   std::vector<FittedRun> runs;
   bool coloured = false;        ///< which of the two standard errors `std_error` is
+  std::vector<std::string> effects;
   std::string rig_file;
   Wagner circulation = Wagner::within_1e4;
   Eigen::Index normal_modes = 0, torsion_modes = 0;

@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include "core/command.h"
+#include "core/effects/effect.h"
 #include "core/text_file.h"
 #include "fit/fit.h"
 #include "fit/fit_files.h"
@@ -13,11 +14,12 @@ namespace unrig {
 int fit_command(int argc, char** argv) {
   CLI::App app{"Fits stiffness, damping and apparent mass of a rig to recordings, all together.", "unrig fit"};
   std::string rig_path, output, circulation = "1e-4";
-  std::vector<std::string> run_paths, starts;
+  std::vector<std::string> run_paths, starts, effect_ids;
   double least = 0.1;
   app.add_option("--rig", rig_path, "rig file (TOML)")->required();
   app.add_option("runs", run_paths, "run files (CSV): free decays and steps of this rig, in any number")->required();
   app.add_option("-o,--output", output, "result (JSON)")->required();
+  app.add_option("--effect", effect_ids, "physics beyond the rig model that is at work (repeatable), e.g. gauge-lowpass");
   app.add_option("--start", starts, "start value of a parameter, NAME=VALUE (repeatable)");
   app.add_option("--wagner", circulation, "circulatory build-up: 1e-4, 1e-6 (largest error), jones, seed")->capture_default_str();
   app.add_option("--correlations", least, "smallest correlation to report")->capture_default_str();
@@ -36,6 +38,11 @@ int fit_command(int argc, char** argv) {
     throw InputError({"--wagner", 0}, e.what(), "wanted one of the names above", "");
   }
   for (const std::string& path : run_paths) problem.runs.push_back(read_run(path));
+  try {
+    for (const std::string& id : effect_ids) problem.effects.push_back(effect(id).id);
+  } catch (const std::invalid_argument& e) {
+    throw InputError({"--effect", 0}, e.what(), "wanted one of these", "");
+  }
   for (const std::string& start : starts) {
     const std::size_t equals = start.find('=');
     const char* text = start.c_str() + (equals == std::string::npos ? 0 : equals + 1);

@@ -6,6 +6,7 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
+#include "core/effects/effect.h"
 #include "core/text_file.h"
 
 namespace unrig {
@@ -46,6 +47,7 @@ std::string to_json(const FitResult& r) {
   out["circulation"] = name_of(r.circulation);
   out["modes"] = {{"normal", r.normal_modes}, {"torsion", r.torsion_modes}};
   out["standard_errors"] = r.coloured ? "from the residuals' own spectra (coloured)" : "white residuals, times sqrt(reduced chi-square) where that exceeds one";
+  if (!r.effects.empty()) out["effects"] = r.effects;
   out["parameters"] = json::array();
   for (const FittedParameter& p : r.parameters) {
     json item = {{"name", p.name},   {"value", number(p.value)}, {"std_error", number(p.std_error)},
@@ -92,6 +94,8 @@ FittedRig read_fit(const std::string& path) {
       fit.normal_modes = in["modes"].value("normal", 0);
       fit.torsion_modes = in["modes"].value("torsion", 0);
     }
+    fit.effects = in.value("effects", std::vector<std::string>{});
+    for (const std::string& id : fit.effects) effect(id);  // refuses what this version does not know
     for (const json& item : in.at("parameters")) {
       FittedParameter p;
       p.name = item.at("name").get<std::string>();

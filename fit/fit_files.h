@@ -13,6 +13,7 @@ struct FittedRig {
   std::string file;
   Wagner circulation = Wagner::within_1e4;
   Eigen::Index normal_modes = 0, torsion_modes = 0;
+  std::vector<std::string> effects;  ///< at work in the fitted model
   std::vector<FittedParameter> parameters;
   Eigen::MatrixXd correlation;
   std::vector<std::string> runs;

@@ -84,9 +84,13 @@ RunResidual::RunResidual(const AeroelasticModel& model, const Run& run, std::vec
 
   // A step starts in the steady state of its first angle; everything else starts anyhow.
   const LinearSystem system = model.system(conditions_, model.start_values(), channels_);
-  free_states_ = run.kind == RunKind::step ? 0 : system.free_states();
+  if (run.kind != RunKind::step) {
+    for (Index i = 0; i < system.free_states(); ++i) free_.push_back(i);
+    free_.insert(free_.end(), system.settling.begin(), system.settling.end());
+  }
+  free_.insert(free_.end(), system.exogenous.begin(), system.exogenous.end());
   first_state_ = motion_.unknowns();
-  first_offset_ = first_state_ + free_states_;
+  first_offset_ = first_state_ + static_cast<Index>(free_.size());
   unknowns_ = first_offset_ + static_cast<Index>(channels_.size());
   if (conditions_.prescribed_pitch) angle_offset_ = unknowns_++;
   prepare_angle_rows();
@@ -134,35 +138,39 @@ void RunResidual::set_motion_prior(const MatrixXd& rows) {
   prepare_angle_rows();
 }
 
+void RunResidual::keep_noise_of(const RunResidual& other) {
+  sigma_ = other.sigma_;
+  weight_ = other.weight_;
+  angle_sigma_ = other.angle_sigma_;
+  angle_ = other.angle_;
+  angle_weight_ = other.angle_weight_;
+  spikes_ = other.spikes_;
+  prepare_angle_rows();
+}
+
 RunResidual RunResidual::with_motion(std::vector<MotionBasis::Window> windows) const {
   RunResidual other(*model_, *run_, std::move(windows));
-  other.sigma_ = sigma_;
-  other.weight_ = weight_;
-  other.angle_sigma_ = angle_sigma_;
-  other.angle_ = angle_;
-  other.angle_weight_ = angle_weight_;
-  other.spikes_ = spikes_;
-  other.prepare_angle_rows();
+  other.keep_noise_of(*this);
   return other;
 }
 
 void RunResidual::settle_noise(const VectorXd& theta) {
   const Prediction p = predict(theta);
-  const auto settle = [&](VectorXd residual, Eigen::Ref<VectorXd> weight, double& sigma) {
+  const auto settle = [&](const std::string& channel, VectorXd residual, Eigen::Ref<VectorXd> weight, double& sigma) {
     for (Index k = 0; k < residual.size(); ++k)
       if (weight[k] == 0) residual[k] = std::nan("");
     constexpr double chance = 0.06;  // two standard deviations between the two estimates for some thousand samples
     const double third = noise_level(residual, 3), first = noise_level(residual, 1);
-    const double level = first < (1 + chance) * third ? first : third;
+    const double level = std::max(first < (1 + chance) * third ? first : third, rounding_level(run_->channel(channel).value));
     if (!(level > 0) || level >= sigma) return;
     weight *= sigma / level;
     sigma = level;
   };
   for (std::size_t c = 0; c < channels_.size(); ++c) {
     const auto column = static_cast<Index>(c);
-    settle(measured_.col(column) - p.output.col(column), weight_.col(column), sigma_[c]);
+    settle(channels_[c], measured_.col(column) - p.output.col(column), weight_.col(column), sigma_[c]);
   }
-  if (angle_offset_ >= 0) settle(angle_ - p.motion.angle - VectorXd::Constant(angle_.size(), p.angle_offset[0]), angle_weight_, angle_sigma_);
+  if (angle_offset_ >= 0) settle("alpha", angle_ - p.motion.angle - VectorXd::Constant(angle_.size(), p.angle_offset[0]), angle_weight_, angle_sigma_);
   prepare_angle_rows();
 }
 

@@ -94,6 +94,7 @@ class RunResidual {
   Eigen::Index degrees_of_freedom() const;
   Eigen::Index observations() const;
   Eigen::Index linear_unknowns() const { return unknowns_; }
+  Eigen::Index first_offset() const { return first_offset_; }  ///< where in c the channels' offsets begin
   /// Angle samples left out as spikes.
   Eigen::Index spikes() const { return spikes_; }
 
@@ -103,6 +104,9 @@ class RunResidual {
 
   /// The same run with other windows of motion; noise levels and samples left out stay as they are.
   RunResidual with_motion(std::vector<MotionBasis::Window> windows) const;
+
+  /// Takes over noise levels and samples left out from the same run held against another model.
+  void keep_noise_of(const RunResidual& other);
 
   /// Takes the noise of each channel from what the model at theta leaves of it, where that is less: differences of the raw channel keep some of
   /// a fast signal. Differences do not see a slow mismatch: of first order (the most
@@ -125,6 +129,7 @@ class RunResidual {
   Eigen::MatrixXd motion_state_columns(const Linearised& lin, Eigen::Index sample) const;
   Interval counted(const Segment& segment) const;
   Eigen::MatrixXd motion_output_columns(const Linearised& lin, Eigen::Index channel, const Interval& samples) const;
+  Eigen::VectorXd initial_state(const Eigen::VectorXd& linear, Eigen::Index states) const;
   Eigen::MatrixXd segment_start(const Linearised& lin, const Interval& samples) const;
   void prepare_angle_rows();
 
@@ -147,7 +152,8 @@ class RunResidual {
   Eigen::Index last_sample_ = 0;
 
   // Layout of c.
-  Eigen::Index free_states_ = 0, unknowns_ = 0;
+  std::vector<Eigen::Index> free_;  ///< states whose initial value is unknown
+  Eigen::Index unknowns_ = 0;
   Eigen::Index first_state_ = 0, first_offset_ = 0, angle_offset_ = -1;
 };
 

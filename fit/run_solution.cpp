@@ -33,6 +33,15 @@ MatrixXd stacked(const std::vector<MatrixXd>& blocks, Index columns) {
   return stack;
 }
 
+MatrixXd power(MatrixXd base, Index exponent) {
+  MatrixXd result = MatrixXd::Identity(base.rows(), base.cols());
+  for (; exponent > 0; exponent /= 2) {
+    if (exponent % 2 == 1) result = result * base;
+    base = base * base;
+  }
+  return result;
+}
+
 /// Least squares by column-scaled QR. Columns that the rows do not determine (a state that no channel sees) are left at zero.
 class Eliminator {
  public:
@@ -118,6 +127,12 @@ struct RunResidual::Linearised {
   double chi2 = 0;
 };
 
+VectorXd RunResidual::initial_state(const VectorXd& linear, Index states) const {
+  VectorXd state = VectorXd::Zero(states);
+  for (std::size_t i = 0; i < free_.size(); ++i) state[free_[i]] = linear[first_state_ + static_cast<Index>(i)];
+  return state;
+}
+
 Interval RunResidual::counted(const Segment& segment) const { return {segment.samples.first, std::min(segment.samples.last, last_sample_)}; }
 
 std::shared_ptr<RunResidual::Linearised> RunResidual::linearise(const VectorXd& theta) const {
@@ -130,7 +145,7 @@ std::shared_ptr<RunResidual::Linearised> RunResidual::linearise(const VectorXd& 
   Index longest = 0, last_motion = 0;
   for (const Segment& s : segments_) {
     if (s.moving) last_motion = s.samples.last;
-    if (!s.moving) longest = std::max(longest, counted(s).length());
+    if (!s.moving || !free_.empty()) longest = std::max(longest, counted(s).length());
   }
   lin->free = free_response_rows(lin->system, lin->step, longest);
   if (motion_.unknowns() > 0) {
@@ -178,7 +193,9 @@ MatrixXd RunResidual::motion_state_columns(const Linearised& lin, Index sample) 
 MatrixXd RunResidual::segment_start(const Linearised& lin, const Interval& samples) const {
   MatrixXd start = MatrixXd::Zero(lin.system.states(), unknowns_);
   if (motion_.unknowns() > 0) start.leftCols(motion_.unknowns()) = motion_state_columns(lin, samples.first);
-  if (free_states_ > 0 && samples.first == 0) start.block(0, first_state_, free_states_, free_states_).setIdentity();
+  if (free_.empty()) return start;
+  const MatrixXd since = samples.first == 0 ? MatrixXd::Identity(lin.system.states(), lin.system.states()) : power(lin.step.transition.value, samples.first);
+  for (std::size_t i = 0; i < free_.size(); ++i) start.col(first_state_ + static_cast<Index>(i)) = since.col(free_[i]);
   return start;
 }
 
@@ -202,6 +219,7 @@ void RunResidual::stack_rows(Linearised& lin) const {
       if (segment.moving) {
         reach = MatrixXd::Zero(length, unknowns_);
         reach.leftCols(motion_.unknowns()) = motion_output_columns(lin, c, s);
+        if (!free_.empty()) reach.middleCols(first_state_, static_cast<Index>(free_.size())) = lin.free[static_cast<std::size_t>(c)].topRows(length) * segment_start(lin, s).middleCols(first_state_, static_cast<Index>(free_.size()));
         reach.col(first_offset_ + c).setOnes();
         reach = w.asDiagonal() * reach;
       } else {
@@ -272,7 +290,7 @@ void RunResidual::follow_partials(const VectorXd& theta, const VectorXd& linear,
   Response known;
   if (inputs_.cols() > 0) known = drive(system, step, DualMatrix(MatrixXd::Zero(system.states(), 1)), run_->samples(), {}, inputs_, Partials::all);
   DualMatrix state(MatrixXd::Zero(system.states(), 1), parameters);
-  state.value.col(0).head(free_states_) = linear.segment(first_state_, free_states_);
+  state.value.col(0) = initial_state(linear, system.states());
   VectorXd jerk;
   if (motion_.unknowns() > 0) jerk = motion_of(motion_.coefficients(linear.head(motion_.unknowns())), run_->dt).jerk;
   for (const Segment& segment : segments_) {
@@ -344,12 +362,12 @@ RunResidual::Prediction RunResidual::predict(const VectorXd& theta) const {
   p.linear = solution.linear;
   p.linear_factor = lin.eliminate->factor();
   p.offset = p.linear.segment(first_offset_, measured_.cols());
-  p.initial_state = p.linear.segment(first_state_, free_states_);
+  p.initial_state = p.linear.segment(first_state_, static_cast<Index>(free_.size()));
   if (angle_offset_ >= 0) p.angle_offset = p.linear.segment(angle_offset_, 1);
   if (motion_.unknowns() > 0) p.motion = motion_of(motion_.coefficients(p.linear.head(motion_.unknowns())), run_->dt);
   p.output.resize(run_->samples(), measured_.cols());
   DualMatrix state(MatrixXd::Zero(lin.system.states(), 1));
-  state.value.col(0).head(free_states_) = p.initial_state;
+  state.value.col(0) = initial_state(p.linear, lin.system.states());
   for (const Segment& segment : segments_) {
     const Interval& s = segment.samples;
     const Response response = segment.moving ? drive(lin.system, lin.step, state, s.length(), p.motion.jerk.segment(s.first, s.length()), {}, Partials::none)
@@ -372,8 +390,12 @@ RunResidual::Sensitivity RunResidual::sensitivity(const VectorXd& theta) const {
   result.channels.assign(static_cast<std::size_t>(measured_.cols()), {VectorXd::Zero(n), MatrixXd::Zero(n, parameters)});
   follow_partials(theta, solution.linear, [&](const Segment& segment, const Interval& s, Index c, MatrixXd m) {
     // c follows theta: the motion through the states, the offset as it is.
-    const MatrixXd follow = segment.moving ? MatrixXd(motion_output_columns(lin, c, s) * e.linear_slope.topRows(motion_.unknowns()))
-                                           : MatrixXd(lin.free[static_cast<std::size_t>(c)].topRows(s.length()) * (segment_start(lin, s) * e.linear_slope));
+    MatrixXd follow = segment.moving ? MatrixXd(motion_output_columns(lin, c, s) * e.linear_slope.topRows(motion_.unknowns()))
+                                     : MatrixXd(lin.free[static_cast<std::size_t>(c)].topRows(s.length()) * (segment_start(lin, s) * e.linear_slope));
+    if (segment.moving && !free_.empty()) {
+      const auto count = static_cast<Index>(free_.size());
+      follow += lin.free[static_cast<std::size_t>(c)].topRows(s.length()) * (segment_start(lin, s).middleCols(first_state_, count) * e.linear_slope.middleRows(first_state_, count));
+    }
     m.leftCols(parameters) += follow;
     m.leftCols(parameters).rowwise() += e.linear_slope.row(first_offset_ + c);
     m.col(parameters) = measured_.col(c).segment(s.first, s.length()) - m.col(parameters);
