@@ -141,6 +141,28 @@ class Rows {
 
 double sensor_gain(const Sensor& sensor) { return sensor.gain; }
 
+/// A run must have what its kind says drives the rig, and the rig must be able to answer to it.
+void check_kind(const Run& run, const Rig& rig) {
+  const auto refuse = [&](const std::string& found, const std::string& wanted) { throw InputError({run.file, run.header_line}, found, wanted, ""); };
+  if (run.kind == RunKind::step && rig.is_modal())
+    refuse("the run is a step of the angle", "wanted a pluck, a forced or a moved run: the rig " + rig.file + " is known only as modes, and has no section");
+  if (run.kind == RunKind::step && !run.find("alpha")) refuse("a step without a column \"alpha\"", "wanted the measured angle");
+  if (run.kind == RunKind::forced && !run.find("force")) refuse("a forced run without a column \"force\"", "wanted the measured force");
+  if (run.kind == RunKind::moved && !run.find("mount_velocity") && !run.find("mount_acceleration"))
+    refuse("a moved run without a column \"mount_velocity\" or \"mount_acceleration\"", "wanted the measured motion of the mount");
+}
+
+/// The gauge must read what the rig's gauge reads. Volts and counts will do for a free decay, whose amplitude is free.
+void check_gauge_unit(const Run& run, const Rig& rig) {
+  const Channel& gauge = run.channel("gauge");
+  const std::string wanted = rig.is_modal() ? rig.modal.front().gauge_unit : "N";
+  const bool raw = gauge.unit == "V" || gauge.unit == "1";
+  if (gauge.unit == wanted || (raw && run.kind == RunKind::pluck)) return;
+  throw InputError({run.file, run.header_line}, fmt::format("the column \"gauge\" is in {}", gauge.file_unit),
+                   fmt::format("wanted a unit of {}, which the gauge of the rig {} reads", wanted, rig.file),
+                   raw ? "Write the calibration into the meta data." : "Give the rig file of this run.");
+}
+
 }  // namespace
 
 Conditions conditions_of(const Run& run) {
@@ -210,6 +232,7 @@ double AeroelasticModel::circulation_amplitude(const VectorXd& theta, Index k) c
 }
 
 std::vector<std::string> AeroelasticModel::output_channels(const Run& run) const {
+  check_kind(run, rig_);
   std::vector<std::string> channels;
   if ((rig_.is_modal() || rig_.gauge_element > 0) && run.find("gauge")) channels.emplace_back("gauge");
   std::string wanted = channels.empty() && (rig_.is_modal() || rig_.gauge_element > 0) ? "a column 'gauge'" : "";
@@ -218,8 +241,9 @@ std::vector<std::string> AeroelasticModel::output_channels(const Run& run) const
     wanted += (wanted.empty() ? "a column '" : " or '") + sensor.column + "'";
   }
   if (channels.empty())
-    throw InputError({run.file, 0}, "none of the columns belongs to this rig (" + rig_.file + ")", "wanted " + (wanted.empty() ? "a gauge or a sensor in the rig file" : wanted),
+    throw InputError({run.file, run.header_line}, "none of the columns belongs to this rig (" + rig_.file + ")", "wanted " + (wanted.empty() ? "a gauge or a sensor in the rig file" : wanted),
                      "Give the rig file of this run, or add the gauge or [[sensor]] to it.");
+  if (channels.front() == "gauge") check_gauge_unit(run, rig_);
   return channels;
 }
 
@@ -432,7 +456,8 @@ std::vector<std::complex<double>> oscillatory_poles(const LinearSystem& system) 
   const Eigen::EigenSolver<MatrixXd> eigen(system.A.value.topLeftCorner(size, size), false);
   std::vector<std::complex<double>> poles;
   for (Index i = 0; i < size; ++i)
-    if (eigen.eigenvalues()[i].imag() > 0) poles.push_back(eigen.eigenvalues()[i]);
+    // Strips share the rates of their lags: equal real poles may come out as pairs that round-off has split.
+    if (eigen.eigenvalues()[i].imag() > 1e-6 * std::abs(eigen.eigenvalues()[i])) poles.push_back(eigen.eigenvalues()[i]);
   std::sort(poles.begin(), poles.end(), [](auto a, auto b) { return std::abs(a) < std::abs(b); });
   return poles;
 }

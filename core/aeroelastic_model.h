@@ -100,7 +100,8 @@ class AeroelasticModel {
   /// The linear system at theta. `channels`: which outputs are wanted ("gauge" and sensor columns).
   LinearSystem system(const Conditions& conditions, const Eigen::VectorXd& theta, const std::vector<std::string>& channels) const;
 
-  /// The fitted output channels that a run of this rig has: its gauge and every sensor column. Throws InputError where there is none.
+  /// The fitted output channels that a run of this rig has: its gauge and every sensor column. Throws InputError where the run does not belong to
+  /// the rig: there is no such channel, the gauge reads something else, or what drives a run of its kind is missing.
   std::vector<std::string> output_channels(const Run& run) const;
 
  private:

@@ -127,7 +127,7 @@ DualMatrix exponential(const DualMatrix& a) {
   const Eigen::VectorXd scale = balancing(a.value.cwiseAbs());
   const DualMatrix balanced = rescaled(a, scale);
 
-  constexpr double largest_scaled_norm = 0.5;
+  constexpr double largest_scaled_norm = 0.25;
   const double norm = balanced.value.cwiseAbs().colwise().sum().maxCoeff();
   const int squarings = norm > largest_scaled_norm ? static_cast<int>(std::ceil(std::log2(norm / largest_scaled_norm))) : 0;
   const DualMatrix x = std::exp2(-squarings) * balanced;

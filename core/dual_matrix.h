@@ -41,8 +41,8 @@ DualMatrix operator*(const Eigen::MatrixXd& constant, const DualMatrix& a);
 DualMatrix solve(const DualMatrix& a, const DualMatrix& b);
 
 /// exp(A), with its Frechet derivatives, by scaling and squaring of the Taylor polynomial of degree 12 after diagonal balancing.
-/// Truncation: below 1e-15 relative to the norm of the scaled matrix's exponential (scaled 1-norm at most 1/2: 0.5^13/13! = 2e-14 times
-/// the next factor); squaring amplifies round-off by at most 2^s.
+/// Truncation: 0.25^13/13! = 2.4e-18 of the scaled matrix's exponential (scaled 1-norm at most 1/4), far below its round-off; s squarings
+/// amplify both by at most 2^s.
 DualMatrix exponential(const DualMatrix& a);
 
 }  // namespace unrig

@@ -40,6 +40,28 @@ double median_of_five(const VectorXd& x, Index k) {
   return near[static_cast<std::size_t>(count / 2)];
 }
 
+/// Sample k minus the cubic through the two nearest samples on either side that are not `out`, over the gain of its noise; 0 where there are none.
+double off_the_cubic(const VectorXd& x, const std::vector<bool>& out, Index k) {
+  const auto usable = [&](Index i) { return std::isfinite(x[i]) && !out[static_cast<std::size_t>(i)]; };
+  if (!usable(k)) return 0;
+  std::vector<Index> near;
+  for (const Index side : {-1, 1}) {
+    const std::size_t wanted = near.size() + 2;
+    for (Index i = k + side; i >= 0 && i < x.size() && near.size() < wanted; i += side)
+      if (usable(i)) near.push_back(i);
+    if (near.size() < wanted) return 0;
+  }
+  double difference = x[k], gain = 1;
+  for (const Index i : near) {
+    double weight = 1;
+    for (const Index j : near)
+      if (j != i) weight *= static_cast<double>(k - j) / static_cast<double>(i - j);
+    difference -= weight * x[i];
+    gain += weight * weight;
+  }
+  return difference / std::sqrt(gain);
+}
+
 }  // namespace
 
 MotionBasis::MotionBasis(Index samples, double dt, std::vector<Window> windows) : samples_(samples), dt_(dt), windows_(std::move(windows)) {
@@ -148,13 +170,10 @@ double noise_level(const VectorXd& channel, int order) {
   for (int k = 1; k <= order; ++k) binomial[static_cast<std::size_t>(k)] = -binomial[static_cast<std::size_t>(k - 1)] * (order - k + 1) / k;
   double gain = 0;
   for (double b : binomial) gain += b * b;
-  std::vector<double> changes;  // between neighbours, where there is any
   for (Index k = 0; k + order < channel.size(); ++k) {
     double difference = 0;
     for (int i = 0; i <= order; ++i) difference += binomial[static_cast<std::size_t>(i)] * channel[k + i];
     if (std::isfinite(difference)) differences.push_back(std::abs(difference));
-    const double change = std::abs(channel[k + 1] - channel[k]);
-    if (change > 0) changes.push_back(change);
   }
   constexpr double median_to_sigma = 1.482602218505602;  // 1 / Phi^-1(3/4)
   const double robust = median_to_sigma * median(differences);
@@ -165,14 +184,24 @@ double noise_level(const VectorXd& channel, int order) {
   for (double d : differences)
     if (d <= cut * robust) sum += d * d, ++count;
   const double level = count > 0 ? std::sqrt(sum / static_cast<double>(count) / cut_variance / gain) : 0;
-  // The smallest change that is not a freak of the file's decimals is the quantum of a coarse converter.
-  double rounding = 0;
-  if (!changes.empty()) {
-    const auto low = changes.begin() + static_cast<std::ptrdiff_t>(changes.size() / 20);
-    std::nth_element(changes.begin(), low, changes.end());
-    rounding = *low / std::sqrt(12.0);
-  }
-  return std::max(level, rounding);
+  return std::max(level, rounding_level(channel));
+}
+
+double rounding_level(const VectorXd& channel) {
+  std::vector<double> changes;  // between neighbours, where there is any
+  for (Index k = 0; k + 1 < channel.size(); ++k)
+    if (const double change = std::abs(channel[k + 1] - channel[k]); change > 0) changes.push_back(change);
+  if (changes.empty()) return 0;
+  const auto quantile = [&](std::size_t one_in) {
+    const auto place = changes.begin() + static_cast<std::ptrdiff_t>(changes.size() / one_in);
+    std::nth_element(changes.begin(), place, changes.end());
+    return *place;
+  };
+  // Of changes spread evenly, as those of a fast signal are, the 5 % quantile is five times the 1 % quantile. Of a converter's both are its
+  // quantum, up to the decimals with which it is printed.
+  const double least = quantile(100), low = quantile(20);
+  constexpr double alike = 1.2;
+  return low < alike * least ? low / std::sqrt(12.0) : 0;
 }
 
 std::vector<bool> isolated_spikes(const VectorXd& x, double sigma, const std::vector<Interval>& motion, double limit) {
@@ -180,6 +209,19 @@ std::vector<bool> isolated_spikes(const VectorXd& x, double sigma, const std::ve
   const auto moves = [&](Index k) { return std::any_of(motion.begin(), motion.end(), [&](const Interval& i) { return k >= i.first && k < i.last; }); };
   for (Index k = 0; k < x.size(); ++k)
     spike[static_cast<std::size_t>(k)] = std::isfinite(x[k]) && !moves(k) && std::abs(x[k] - median_of_five(x, k)) > limit * sigma;
+
+  std::vector<std::pair<double, Index>> suspects;
+  for (const Interval& i : motion)
+    for (Index k = i.first; k < i.last; ++k)
+      if (const double off = std::abs(off_the_cubic(x, spike, k)); off > limit * sigma) suspects.emplace_back(-off, k);
+  std::sort(suspects.begin(), suspects.end());
+  for (const auto& [off, k] : suspects) {
+    const auto out = static_cast<std::size_t>(k);
+    if (std::abs(off_the_cubic(x, spike, k)) <= limit * sigma) continue;  // it was its neighbour
+    spike[out] = true;
+    for (Index j = std::max<Index>(0, k - 2); j <= std::min(x.size() - 1, k + 2); ++j)
+      if (j != k && std::abs(off_the_cubic(x, spike, j)) > limit * sigma) spike[out] = false;
+  }
   return spike;
 }
 

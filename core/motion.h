@@ -62,11 +62,15 @@ Motion interpolated_motion(const Eigen::VectorXd& angle, double dt);
 
 /// Standard deviation of the white part of a channel: from its differences of order `order`, scaled by their gain sqrt(C(2 order, order)), cut
 /// off at 3.5 of their median so that transients and spikes do not count. A slowly varying signal is suppressed by (2 sin(omega dt/2))^order. Missing
-/// samples are left out. A channel that is quantised more coarsely than its noise returns quantum/sqrt(12).
+/// samples are left out. A channel that is quantised more coarsely than its noise returns `rounding_level`.
 double noise_level(const Eigen::VectorXd& channel, int order = 6);
 
-/// Isolated electrical spikes: samples that differ from the value interpolated from two neighbours on either side by more than `limit` sigma while
-/// those neighbours agree among themselves. Returns true where a sample should be left out. Samples inside `motion` are not judged here.
+/// quantum/sqrt(12) of a channel from a coarse converter, whose smallest changes are all of one size; 0 where they are not.
+double rounding_level(const Eigen::VectorXd& channel);
+
+/// Isolated electrical spikes: samples that differ by more than `limit` sigma from the median of the five around them or, where the shaft moves
+/// (inside `motion`), from the cubic through two neighbours on either side, provided that without them all neighbours lie on theirs: a motion too
+/// fast for its samples is no spike. Returns true where a sample should be left out.
 std::vector<bool> isolated_spikes(const Eigen::VectorXd& channel, double sigma, const std::vector<Interval>& motion, double limit = 6);
 
 /// Where the shaft moves: samples whose median-filtered angle changes by more than the noise allows, merged where they nearly touch.

@@ -12,13 +12,17 @@ using Eigen::VectorXd;
 
 constexpr Index block_length = 32;
 
+bool acts(const LinearSystem& system, Index parameter) {
+  return system.A.depends_on(parameter) || system.B.depends_on(parameter) || system.C.depends_on(parameter) || system.D.depends_on(parameter);
+}
+
 Response make_response(Index samples, const LinearSystem& system, Partials partials) {
   Response r;
   r.output.resize(samples, system.C.rows());
   if (partials == Partials::all) {
     r.partial.assign(static_cast<std::size_t>(system.A.parameters()), MatrixXd());
     for (Index j = 0; j < system.A.parameters(); ++j)
-      if (system.A.depends_on(j) || system.C.depends_on(j)) r.partial[static_cast<std::size_t>(j)].resize(samples, system.C.rows());
+      if (acts(system, j)) r.partial[static_cast<std::size_t>(j)].resize(samples, system.C.rows());
   }
   return r;
 }
@@ -90,7 +94,7 @@ Response drive(const LinearSystem& system, const ExactStep& step, const DualMatr
   std::vector<Index> active;  // parameters carried along
   if (partials == Partials::all)
     for (Index j = 0; j < system.A.parameters(); ++j)
-      if (system.A.depends_on(j) || system.C.depends_on(j)) active.push_back(j);
+      if (acts(system, j)) active.push_back(j);
   const auto count = static_cast<Index>(active.size());
   const bool has_jerk = jerk.size() > 0, has_input = input.rows() > 0;
 

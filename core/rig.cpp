@@ -107,19 +107,30 @@ SensorKind sensor_kind(const TomlTable& sensor) {
               "wanted \"displacement\", \"velocity\", \"acceleration\", \"twist\" or \"twist_rate\"");
 }
 
-/// A plain number, or number and unit: "0.5 V/m" is the gain of a column in volts.
-double sensor_gain(const TomlTable& sensor) {
-  double gain = 1;
-  if (sensor.has_text("gain")) {
-    const InputError::Place place = sensor.place("gain");
-    const std::string name = sensor.full_name("gain");
-    const Measure measure = split_quantity(sensor.text("gain"), place, name);
-    gain = unit_scale(measure.unit, si_unit(measure.unit, place, name), place, name)(measure.value);
-  } else {
-    gain = sensor.number_or("gain", 1);
+const char* quantity_unit(SensorKind kind) {
+  switch (kind) {
+    case SensorKind::displacement: return "m";
+    case SensorKind::velocity: return "m/s";
+    case SensorKind::acceleration: return "m/s^2";
+    case SensorKind::twist: return "rad";
+    case SensorKind::twist_rate: return "rad/s";
   }
-  if (gain == 0) sensor.fail("gain", fmt::format("{} is 0", sensor.full_name("gain")), "wanted a gain that is not zero");
-  return gain;
+  return "";
+}
+
+/// A plain number, or number and unit: "0.5 V/m" is the gain of a column in volts.
+void take_sensor_gain(const TomlTable& table, Sensor& sensor) {
+  sensor.unit = quantity_unit(sensor.reads);
+  if (table.has_text("gain")) {
+    const InputError::Place place = table.place("gain");
+    const std::string name = table.full_name("gain");
+    const Measure measure = split_quantity(table.text("gain"), place, name);
+    sensor.gain = unit_scale(measure.unit, si_unit(measure.unit, place, name), place, name)(measure.value);
+    sensor.unit = si_unit(fmt::format("({}).({})", measure.unit, sensor.unit), place, name);
+  } else {
+    sensor.gain = table.number_or("gain", 1);
+  }
+  if (sensor.gain == 0) table.fail("gain", fmt::format("{} is 0", table.full_name("gain")), "wanted a gain that is not zero");
 }
 
 void take_sensors(const TomlTable& file, Rig& rig) {
@@ -130,7 +141,7 @@ void take_sensors(const TomlTable& file, Rig& rig) {
     sensor.reads = sensor_kind(table);
     const bool turns = sensor.reads == SensorKind::twist || sensor.reads == SensorKind::twist_rate;
     sensor.element = element_number(table, "element", turns ? rig.torsion.inertia.size() : rig.station.size());
-    sensor.gain = sensor_gain(table);
+    take_sensor_gain(table, sensor);
     const auto same = [&sensor](const Sensor& other) { return other.column == sensor.column; };
     if (std::any_of(rig.sensors.begin(), rig.sensors.end(), same)) {
       table.fail("column", fmt::format("two sensors name the column \"{}\"", sensor.column), "wanted one sensor per column");

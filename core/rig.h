@@ -23,6 +23,7 @@ struct Sensor {
   SensorKind reads = SensorKind::displacement;
   int element = 1;  ///< from 1, in the normal chain, or in the torsion chain for twist and twist_rate
   double gain = 1;  ///< column (SI) per unit of the model's quantity (SI)
+  std::string unit;  ///< SI unit of the column: the quantity's, times the gain's where the gain has one ("0.5 V/m")
 };
 
 /// One mode of a rig that is known only as modes.

@@ -311,7 +311,8 @@ Run read_run(const std::string& path) {
   if (parts.table.empty()) {
     throw InputError({path, parts.lines}, "the file ends after its meta data", "wanted a header row `name [unit],...` and numbers", "");
   }
-  CsvTable table = read_csv(parts.table, parts.lines + 1, path);
+  run.header_line = parts.lines + 1;
+  CsvTable table = read_csv(parts.table, run.header_line, path);
   take_columns(table, calibrations, run);
   warn_of_idle_calibration(calibrations.gauge, "gauge", run);
   warn_of_idle_calibration(calibrations.force, "force", run);

@@ -29,6 +29,7 @@ struct Channel {
 /// `[[sensor]]` of the rig may name; where UDUNITS does not know their unit they are kept as they are. `time` is the grid and no channel.
 struct Run {
   std::string file;
+  int header_line = 0;  ///< of the file, where the columns are named
   std::string name;
   RunKind kind = RunKind::step;
   std::string medium;

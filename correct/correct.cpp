@@ -199,6 +199,9 @@ CorrectResult correct(const CorrectProblem& problem) {
                                                    : make_basis(problem.rig, 0.5 / run.dt, run.density);
   const AeroelasticModel model =
       AeroelasticModel(problem.rig, basis, {"free", wagner_amplitudes(rates, length), rates}, AeroelasticModel::Circulation::free).with_effects(problem.fit.effects);
+  for (const Parameter& p : model.parameters())
+    if (!p.per_run && !problem.fit.find(p.name, run.file))
+      throw InputError({problem.fit.file, 0}, "no parameter \"" + p.name + "\"", "wanted a fit of the rig " + problem.rig.file, "Fit this rig to its free decays and steps first.");
   VectorXd theta = theta_for(model, problem.fit, run.file);
   const Prior prior = prior_of(model, problem.fit, theta, run.file);
 

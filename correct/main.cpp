@@ -5,6 +5,7 @@
 #include "core/command.h"
 #include "core/error.h"
 #include "correct/correct_command.h"
+#include "fit/apparent_mass_command.h"
 #include "fit/fit_command.h"
 #include "fit/simulate_command.h"
 
@@ -13,6 +14,7 @@ namespace {
 constexpr unrig::Command commands[] = {
     {"simulate", "simulate what gauge and sensors of a rig read in a run", unrig::simulate_command},
     {"fit", "fit stiffness, damping and apparent mass of a rig to recordings", unrig::fit_command},
+    {"apparent-mass", "apparent mass of the fluid from the frequencies of a dry and a wet free decay", unrig::apparent_mass_command},
     {"correct", "take the rig out of a gauge record: rigid-rig load and indicial response", unrig::correct_command},
 };
 

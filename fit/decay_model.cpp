@@ -98,9 +98,8 @@ DecayModel::Evaluation DecayModel::evaluate(const std::vector<Pole>& poles, bool
     const MatrixXd q = qr.householderQ() * MatrixXd::Identity(n, rank);
     const VectorXd y = weight * signal_.col(c);
     const VectorXd amplitude = qr.solve(y);
-    const auto project = [&](const VectorXd& v) -> VectorXd { return v - q * (q.transpose() * v); };
     e.amplitude.col(c) = amplitude;
-    e.residual.segment(n * c, n) = project(y);
+    e.residual.segment(n * c, n) = y - q * (q.transpose() * y);
 
     // Covariance of the amplitudes at fixed poles, for how far each mode stands above nothing.
     const MatrixXd r = qr.matrixR().topLeftCorner(rank, rank).triangularView<Eigen::Upper>();
@@ -113,19 +112,20 @@ DecayModel::Evaluation DecayModel::evaluate(const std::vector<Pole>& poles, bool
       e.significance(m, c) = covariance.determinant() > 0 ? pair.dot(covariance.inverse() * pair) : 0;
     }
     if (!derivatives) continue;
+    MatrixXd slopes(n, 2 * count);  // of the model's prediction at fixed amplitudes
     for (Index m = 0; m < count; ++m) {
       const double a = amplitude[1 + 2 * m], b = amplitude[2 + 2 * m];
-      const VectorXd by_omega = time.cwiseProduct(b * z.col(m).real() - a * z.col(m).imag());
-      const VectorXd by_decay = -time.cwiseProduct(a * z.col(m).real() + b * z.col(m).imag());
-      e.jacobian.block(n * c, 2 * m, n, 1) = -project(weight * by_omega);
-      e.jacobian.block(n * c, 2 * m + 1, n, 1) = -project(weight * by_decay);
+      slopes.col(2 * m) = time.cwiseProduct(b * z.col(m).real() - a * z.col(m).imag());
+      slopes.col(2 * m + 1) = -time.cwiseProduct(a * z.col(m).real() + b * z.col(m).imag());
     }
+    slopes = weight * slopes;
+    e.jacobian.middleRows(n * c, n) = q * (q.transpose() * slopes) - slopes;
   }
   e.chi2 = e.residual.squaredNorm();
   return e;
 }
 
-double fit_poles(const DecayModel& model, std::vector<Pole>& poles, double tolerance) {
+double fit_poles(const DecayModel& model, std::vector<Pole>& poles, double tolerance, int iterations) {
   if (poles.empty()) return model.evaluate(poles, false).chi2;
   const double lowest = 0.2 * 2 * std::numbers::pi / model.duration(), highest = std::numbers::pi / model.dt();
   const double growth = -3 / model.duration(), fastest = 1 / model.dt();
@@ -144,7 +144,7 @@ double fit_poles(const DecayModel& model, std::vector<Pole>& poles, double toler
   problem.AddResidualBlock(new DecayCost(model, poles.size()), nullptr, values.data());
   ceres::Solver::Options options;
   options.linear_solver_type = ceres::DENSE_NORMAL_CHOLESKY;
-  options.max_num_iterations = 100;
+  options.max_num_iterations = iterations;
   options.function_tolerance = tolerance;
   options.parameter_tolerance = 1e-13;
   options.gradient_tolerance = 1e-14;

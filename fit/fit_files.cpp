@@ -124,9 +124,13 @@ FittedRig read_fit(const std::string& path) {
 }
 
 const FittedParameter* FittedRig::find(const std::string& name, const std::string& run_file) const {
-  for (const FittedParameter& p : parameters)
-    if (p.name == name && (p.run.empty() || base_name(p.run) == base_name(run_file))) return &p;
-  return nullptr;
+  const FittedParameter* alike = nullptr;  // by the file's name alone: the recordings may have moved
+  for (const FittedParameter& p : parameters) {
+    if (p.name != name) continue;
+    if (p.run.empty() || p.run == run_file) return &p;
+    if (!alike && base_name(p.run) == base_name(run_file)) alike = &p;
+  }
+  return alike;
 }
 
 double FittedRig::value(const std::string& name, const std::string& run_file, double missing) const {

@@ -18,7 +18,7 @@ struct FittedRig {
   Eigen::MatrixXd correlation;
   std::vector<std::string> runs;
 
-  /// The value of a parameter, of this run (by file name without folders) where it has its own; `missing` where there is none.
+  /// The value of a parameter, of this run (by its path, or else by file name without folders) where it has its own; `missing` where there is none.
   double value(const std::string& name, const std::string& run_file, double missing) const;
   const FittedParameter* find(const std::string& name, const std::string& run_file) const;
 };

@@ -115,7 +115,7 @@ JointProblem::Summary JointProblem::solve(const SolveOptions& options) {
   Summary summary;
   summary.converged = report.termination_type == ceres::CONVERGENCE;
   summary.chi2 = 2 * report.final_cost;
-  summary.evaluations = report.num_jacobian_evaluations;
+  summary.evaluations = std::max(0, report.num_jacobian_evaluations);  // -1 where nothing was free
   summary.message = report.message;
   return summary;
 }

@@ -2,6 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
+
+#include <fmt/format.h>
 
 #include "core/run_inputs.h"
 
@@ -10,6 +13,25 @@ namespace unrig {
 using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
+
+namespace {
+
+/// No reading is better than its converter, nor than the digits of a simulation, about a hundred-millionth of its range.
+double least_noise(const VectorXd& value) {
+  double low = std::numeric_limits<double>::infinity(), high = -low;
+  for (const double x : value)
+    if (std::isfinite(x)) low = std::min(low, x), high = std::max(high, x);
+  constexpr double digits = 1e-8;
+  return high > low ? std::max(rounding_level(value), digits * (high - low)) : 0;
+}
+
+/// Standard deviation of a channel's noise; 0 where the channel never changes.
+double noise_of(const VectorXd& value) {
+  const double least = least_noise(value);
+  return least > 0 ? std::max(noise_level(value), least) : 0;
+}
+
+}  // namespace
 
 std::vector<MotionBasis::Window> motion_windows(const Run& run) {
   const Channel* alpha = run.find("alpha");
@@ -46,13 +68,17 @@ RunResidual::RunResidual(const AeroelasticModel& model, const Run& run, std::vec
 
   VectorXd use = VectorXd::Ones(n);
   if (const Channel* weight = run.find("weight")) use = weight->value.unaryExpr([](double w) { return std::isfinite(w) ? std::sqrt(w) : 0.0; });
+  const auto judged = [counts = VectorXd(use)](const VectorXd& value) -> VectorXd { return (counts.array() > 0).select(value, std::nan("")); };  // for the noise
   use.tail(n - last_sample_).setZero();
 
   measured_.resize(n, static_cast<Index>(channels_.size()));
   weight_.resizeLike(measured_);
   for (std::size_t c = 0; c < channels_.size(); ++c) {
     const VectorXd& value = run.channel(channels_[c]).value;
-    sigma_.push_back(noise_level(value));
+    sigma_.push_back(noise_of(judged(value)));
+    if (!(sigma_[c] > 0))
+      throw InputError({run.file, run.header_line}, fmt::format("the column \"{}\" never changes", channels_[c]), "wanted a reading that answers to the rig",
+                       "Look for a broken cable or a stopped converter.");
     for (Index k = 0; k < n; ++k) {
       const bool there = std::isfinite(value[k]);
       measured_(k, static_cast<Index>(c)) = there ? value[k] : 0;
@@ -61,7 +87,7 @@ RunResidual::RunResidual(const AeroelasticModel& model, const Run& run, std::vec
   }
   if (conditions_.prescribed_pitch) {
     const VectorXd& value = run.channel("alpha").value;
-    angle_sigma_ = noise_level(value);
+    angle_sigma_ = noise_of(judged(value));
     const std::vector<bool> spike = isolated_spikes(value, angle_sigma_, active);
     angle_ = value;
     angle_weight_ = use / angle_sigma_;
@@ -161,7 +187,7 @@ void RunResidual::settle_noise(const VectorXd& theta) {
       if (weight[k] == 0) residual[k] = std::nan("");
     constexpr double chance = 0.06;  // two standard deviations between the two estimates for some thousand samples
     const double third = noise_level(residual, 3), first = noise_level(residual, 1);
-    const double level = std::max(first < (1 + chance) * third ? first : third, rounding_level(run_->channel(channel).value));
+    const double level = std::max(first < (1 + chance) * third ? first : third, least_noise(run_->channel(channel).value));
     if (!(level > 0) || level >= sigma) return;
     weight *= sigma / level;
     sigma = level;

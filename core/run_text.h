@@ -1,0 +1,16 @@
+#pragma once
+#include <string>
+#include <vector>
+
+#include "core/run.h"
+
+namespace unrig {
+
+/// `run` as the text of a run file (formats.md, section 2), which read_run reads back: name, kind, medium, density and speed, then time and
+/// every channel. `remarks` become lines of the head that readers skip.
+///
+/// A channel stands in the unit of the file it came from; one that was calibrated (volts to newtons) or shifted (degC) stands in SI, and so
+/// the calibration is not repeated. Numbers carry ten significant digits, missing samples are `nan`.
+std::string run_text(const Run& run, const std::vector<std::string>& remarks = {});
+
+}  // namespace unrig

@@ -1,0 +1,15 @@
+#pragma once
+#include <string>
+
+#include "fit/apparent_mass.h"
+
+namespace unrig {
+
+/// `apparent.json` (formats.md, section 4). Beyond it: `modes` of each run, `parameters` as in fit.json, `frequency_ratio`, `joint_fit`, `agreement`.
+/// What a rig that is known only as modes does not have is null.
+std::string to_json(const ApparentMassResult& result);
+
+/// Text report: the apparent mass beside theory and joint fit, every vibration heard and the mode it is.
+std::string report(const ApparentMassResult& result);
+
+}  // namespace unrig

@@ -1,0 +1,164 @@
+#include "fit/simulate_command.h"
+
+#include <fmt/format.h>
+
+#include <CLI/CLI.hpp>
+#include <complex>
+#include <filesystem>
+#include <numbers>
+#include <optional>
+
+#include "core/command.h"
+#include "core/run_text.h"
+#include "core/scan.h"
+#include "core/simulate.h"
+#include "core/text_file.h"
+#include "core/units.h"
+#include "fit/fit_files.h"
+
+namespace unrig {
+namespace {
+
+using Eigen::Index;
+
+constexpr const char* steady_name = "steady_normal_force";
+
+struct Options {
+  std::string rig, run, fit, output, circulation, release_load;
+  Index normal_modes = 0, torsion_modes = 0;
+  std::vector<std::string> settings;
+  bool jumps = false;
+};
+
+IndicialFunction circulation_of(const Options& options, const std::optional<FittedRig>& fit) {
+  if (options.circulation.empty()) return wagner(fit ? fit->circulation : Wagner::within_1e4);
+  try {
+    return wagner(wagner_from_name(options.circulation));
+  } catch (const std::invalid_argument& e) {
+    throw InputError({"--wagner", 0}, e.what(), "wanted one of the names above", "");
+  }
+}
+
+/// The rig file's modes; a fit's where there is one; what the command line asks for above all.
+Basis basis_of(const Rig& rig, const Run& run, const std::optional<FittedRig>& fit, const Options& options) {
+  if (rig.is_modal()) {
+    if (options.normal_modes + options.torsion_modes > 0 || !options.circulation.empty())
+      throw InputError({rig.file, 0}, "the rig is known only as modes", "wanted no --modes, --torsion-modes or --wagner for it", "");
+    return {};
+  }
+  const Basis asked = make_basis(rig, 0.5 / run.dt, run.density);
+  const auto choose = [](Index command_line, Index fitted, Index file) {
+    return command_line > 0 ? command_line : fitted > 0 ? fitted : file;
+  };
+  try {
+    return make_basis(rig, choose(options.normal_modes, fit ? fit->normal_modes : 0, asked.normal_modes),
+                      choose(options.torsion_modes, fit ? fit->torsion_modes : 0, asked.torsion_modes));
+  } catch (const std::invalid_argument& e) {
+    throw InputError({rig.file, 0}, e.what(), "wanted no more modes than the rig has", "");
+  }
+}
+
+/// `name=value` into theta, or into the steady load, which is no parameter of the motion.
+void set(const std::string& setting, SimulateProblem& problem) {
+  const InputError::Place place{"--set", 0};
+  const std::size_t equals = setting.find('=');
+  const std::string name = setting.substr(0, equals);
+  std::string names = steady_name;
+  Index found = -1;
+  for (std::size_t j = 0; j < problem.model.parameters().size(); ++j) {
+    if (problem.model.parameters()[j].name == name) found = static_cast<Index>(j);
+    names += ", " + problem.model.parameters()[j].name;
+  }
+  double value = 0;
+  const char* first = equals == std::string::npos ? nullptr : setting.data() + equals + 1;
+  const char* last = setting.data() + setting.size();
+  if (!first || first == last || read_number(first, last, value) != last || !std::isfinite(value))
+    throw InputError(place, fmt::format("\"{}\" sets nothing", setting), "wanted name=value with a finite number", "");
+  if (name == steady_name)
+    problem.steady_normal_force = value;
+  else if (found >= 0)
+    problem.theta[found] = value;
+  else
+    throw InputError(place, fmt::format("no parameter is called \"{}\"", name), "wanted one of: " + names, "");
+}
+
+SimulateProblem problem_of(const Options& options) {
+  const Rig rig = read_rig(options.rig);
+  for (const std::string& warning : rig.warnings) warn(warning);
+  Run run = read_run(options.run);
+  for (const std::string& warning : run.warnings) warn(warning);
+  std::optional<FittedRig> fit;
+  if (!options.fit.empty()) fit = read_fit(options.fit);
+
+  SimulateProblem problem{{rig, basis_of(rig, run, fit, options), circulation_of(options, fit)}, {}, std::move(run), {}, {}, {}};
+  problem.theta = fit ? theta_for(problem.model, *fit, problem.run.file) : problem.model.start_values();
+  if (fit)
+    if (const FittedParameter* steady = fit->find(steady_name, problem.run.file)) problem.steady_normal_force = steady->value;
+  for (const std::string& setting : options.settings) set(setting, problem);
+  if (options.jumps) problem.pitch = PitchBetweenSamples::jumps;
+  if (!options.release_load.empty()) problem.release_load = quantity(options.release_load, "N", {"--release-load", 0}, "the release load");
+  return problem;
+}
+
+/// What was assumed, for the head of the file: whoever reads it later can run it again.
+std::vector<std::string> recipe(const SimulateProblem& problem) {
+  const AeroelasticModel& model = problem.model;
+  std::vector<std::string> lines{fmt::format("simulated with the rig \"{}\"", model.rig().name)};
+  if (!model.rig().is_modal())
+    lines.front() += fmt::format(", {} normal and {} torsional modes, circulation {}", model.basis().normal_modes,
+                                 model.basis().torsion_modes, model.circulation().name);
+  for (std::size_t j = 0; j < model.parameters().size(); ++j)
+    lines.push_back(
+        fmt::format("{} = {:.10g} {}", model.parameters()[j].name, problem.theta[static_cast<Index>(j)], model.parameters()[j].unit));
+  if (problem.steady_normal_force) lines.push_back(fmt::format("{} = {:.10g} 1", steady_name, *problem.steady_normal_force));
+  if (problem.release_load) lines.push_back(fmt::format("released from {:.10g} N", *problem.release_load));
+  if (problem.pitch == PitchBetweenSamples::jumps) lines.emplace_back("the angle jumps between samples");
+  return lines;
+}
+
+void print_summary(const SimulateProblem& problem, const SimulateResult& result, const std::string& output) {
+  fmt::print("{}: {} samples of {:.6g} s\n", output, result.run.samples(), result.run.dt);
+  for (const std::string& name : result.simulated) {
+    const Channel& channel = result.run.channel(name);
+    fmt::print("  {:<14} {: .6g} to {: .6g} {}\n", name, channel.value.minCoeff(), channel.value.maxCoeff(), channel.unit);
+  }
+  const LinearSystem system = problem.model.system(conditions_of(problem.run), problem.theta, {});
+  for (const std::complex<double> pole : oscillatory_poles(system)) {
+    const double hertz = pole.imag() / (2 * std::numbers::pi);
+    if (hertz < 0.5 / result.run.dt) fmt::print("  resonance {:9.4f} Hz, damping ratio {:.5f}\n", hertz, -pole.real() / std::abs(pole));
+  }
+}
+
+}  // namespace
+
+int simulate_command(int argc, char** argv) {
+  CLI::App app{"Simulates what gauge and sensors of a rig read in a run: from its angle, force or motion of the mount.", "unrig simulate"};
+  Options options;
+  app.add_option("--rig", options.rig, "rig file (TOML)")->required();
+  app.add_option("--run", options.run,
+                 "run file (CSV) with the conditions and the inputs: alpha, force, mount_velocity, mount_acceleration")
+      ->required();
+  app.add_option("--fit", options.fit, "parameters, modes and circulation from a fit (JSON)");
+  app.add_option("-o,--output", options.output, "simulated run (CSV)")->required();
+  app.add_option("--wagner", options.circulation, "circulatory build-up: 1e-4 (default), 1e-6 (largest error), jones, seed");
+  app.add_option("--modes", options.normal_modes, "normal modes, in place of the rig file's or the fit's")->check(CLI::PositiveNumber);
+  app.add_option("--torsion-modes", options.torsion_modes, "torsional modes, likewise")->check(CLI::PositiveNumber);
+  app.add_option("--set", options.settings, "name=value of a model parameter (formats as in fit.json), in SI; may be repeated");
+  app.add_option("--release-load", options.release_load, "load at the calibration element that a pluck is released from, such as \"20 N\"");
+  app.add_flag("--jumps", options.jumps, "the angle jumps from sample to sample: ideal steps, in place of a spline");
+  app.footer("Example:\n  unrig simulate --rig rig.toml --run step.csv --set normal.damping_ratio=0 -o simulated.csv");
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& e) {
+    return app.exit(e) == 0 ? exit_done : exit_wrong_use;
+  }
+
+  const SimulateProblem problem = problem_of(options);
+  const SimulateResult result = simulate(problem);
+  for (const std::string& warning : result.warnings) warn(warning);
+  write_text(options.output, run_text(result.run, recipe(problem)));
+  print_summary(problem, result, options.output);
+  return exit_done;
+}
+
+}  // namespace unrig

@@ -1,0 +1,152 @@
+#include "correct/correct.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+#include <vector>
+
+#include "core/csv_table.h"
+#include "core/error.h"
+#include "core/text_file.h"
+#include "core/wagner.h"
+#include "correct/corrected_files.h"
+#include "fit/fit.h"
+#include "tests/support/sample_data.h"
+#include "tests/support/temporary_directory.h"
+
+namespace unrig {
+namespace {
+
+using Eigen::Index;
+using Eigen::VectorXd;
+using ::testing::HasSubstr;
+
+Rig null_rig() { return read_rig(test::null_campaign("rig.toml")); }
+
+/// What `unrig fit` finds in the five runs, read back from its file; once per process.
+const FittedRig& null_fit() {
+  static const FittedRig fitted = [] {
+    FitProblem problem;
+    problem.rig = null_rig();
+    for (const std::string run : {"dry_pluck", "wet_pluck", "step_a", "step_b", "step_c"}) problem.runs.push_back(read_run(test::null_campaign(run + ".csv")));
+    const test::TemporaryDirectory directory;
+    return read_fit(directory.file("fit.json", to_json(fit(problem))));
+  }();
+  return fitted;
+}
+
+struct Truth {
+  VectorXd time, gauge, circulatory, normal_force;
+};
+
+Truth truth_of(const std::string& run) {
+  const std::string file = test::null_campaign("truth_" + run + ".csv"), text = read_text(file);
+  const CsvTable table = read_csv(text, 1, file);
+  const auto column = [&](const std::string& name) {
+    return std::find_if(table.columns.begin(), table.columns.end(), [&](const CsvColumn& c) { return c.name == name; })->value;
+  };
+  return {column("time"), column("gauge_clean"), column("circulatory"), column("normal_force")};
+}
+
+constexpr double true_onset = 1;  ///< s: the simulator's shafts begin to turn here, in every run
+
+double rms(const VectorXd& x) { return x.norm() / std::sqrt(static_cast<double>(x.size())); }
+
+TEST(Correct, FindsTheLoadOfARigidRig) {
+  for (const std::string name : {"step_a", "step_b", "step_c", "heldout"}) {
+    const CorrectResult result = correct({null_rig(), null_fit(), read_run(test::null_campaign(name + ".csv"))});
+    const Truth truth = truth_of(name);
+    ASSERT_EQ(result.circulatory.size(), truth.circulatory.size());
+    const double size = std::abs(truth.circulatory[truth.circulatory.size() - 1] - truth.circulatory[0]);
+
+    // From 0.5 to 8 semichords after the step. The bound, 2 %, is what the project promises; 0.26 % is the worst that was measured.
+    std::vector<Index> window;
+    for (Index k = 0; k < truth.time.size(); ++k) {
+      const double semichords = (truth.time[k] - true_onset) * result.semichords_per_second;
+      if (semichords >= 0.5 && semichords <= 8) window.push_back(k);
+    }
+    ASSERT_GT(window.size(), 400u);
+    const VectorXd error = (result.circulatory - truth.circulatory)(window), raw = (truth.gauge - truth.circulatory)(window);
+    EXPECT_LT(rms(error), 0.02 * size) << name;
+    EXPECT_GT(rms(raw), 0.4 * size) << name << ": the reading itself is far off";
+
+    // Its own error bars: neither too small nor so wide that they say nothing. Errors of neighbouring samples are one error, so that their
+    // r.m.s. scatters by half of itself.
+    const VectorXd in_deviations = error.cwiseQuotient(result.circulatory_std(window));
+    EXPECT_LT(rms(in_deviations), 2) << name;
+    EXPECT_LT(in_deviations.cwiseAbs().maxCoeff(), 5) << name;
+    EXPECT_LT(rms(result.circulatory_std(window)), 0.01 * size) << name;
+    EXPECT_GT(result.circulatory_std.minCoeff(), 0) << name;
+
+    EXPECT_GT(result.reduced_chi2, 0.9) << name;
+    EXPECT_LT(result.reduced_chi2, 1.15) << name;
+    EXPECT_NEAR(result.onset, true_onset, 0.006) << name << ": three samples";
+  }
+}
+
+TEST(Correct, FindsHowCirculationBuildsUp) {
+  for (const std::string name : {"step_a", "step_b", "heldout"}) {
+    const CorrectResult result = correct({null_rig(), null_fit(), read_run(test::null_campaign(name + ".csv"))});
+    EXPECT_NEAR(result.slope, 5.8636, 3 * result.slope_std) << name;  // KEY.json
+    for (Index i = 0; i < result.indicial.value.size(); ++i) {
+      const double s = result.indicial.semichords[i];
+      if (s < 0.5 || s > 20) continue;
+      // The response is normalised by the slope, whose own error (0.6 %) is in its standard deviation.
+      EXPECT_NEAR(result.indicial.value[i], wagner_exact(s), 4 * result.indicial.std[i]) << name << " at " << s << " semichords";
+      EXPECT_LT(result.indicial.std[i], 0.02) << name << " at " << s << " semichords";
+    }
+    EXPECT_LT(result.trusted_from, 0.5);
+  }
+}
+
+TEST(Correct, LoadIsCirculatoryPlusInertiaAndStartsSteady) {
+  const CorrectResult result = correct({null_rig(), null_fit(), read_run(test::null_campaign("step_a.csv"))});
+  // Before the motion and long after it there is nothing but circulation.
+  for (const Index k : {Index{0}, Index{300}, Index{2999}}) EXPECT_NEAR(result.normal_force[k], result.circulatory[k], 1e-3) << k;
+  EXPECT_GT((result.normal_force - result.circulatory).cwiseAbs().maxCoeff(), 50) << "the ramp itself is apparent mass";
+}
+
+// ---------------------------------------------------------------------------------------------------------------- no answer
+
+std::string refusal(const CorrectProblem& problem) {
+  try {
+    correct(problem);
+  } catch (const InputError& error) {
+    return std::string("input: ") + error.what();
+  } catch (const NoAnswer& error) {
+    return std::string("no answer: ") + error.what();
+  }
+  return "no error";
+}
+
+TEST(Correct, SaysWhatItCannotCorrect) {
+  unrig::Run step = read_run(test::null_campaign("step_a.csv"));
+  EXPECT_THAT(refusal({null_rig(), null_fit(), read_run(test::null_campaign("wet_pluck.csv"))}), ::testing::AllOf(HasSubstr("input: "), HasSubstr("wet_pluck.csv")));
+
+  Rig modal;
+  modal.file = "modes.toml";
+  modal.modal = {{1, 3, 0.01, 1, "N"}};
+  EXPECT_THAT(refusal({modal, null_fit(), step}), ::testing::AllOf(HasSubstr("input: modes.toml"), HasSubstr("only as modes")));
+
+  for (Channel& channel : step.channels)
+    if (channel.name == "alpha") channel.value.tail(channel.value.size() - 500) = channel.value.segment(0, 500).replicate(5, 1);
+  EXPECT_THAT(refusal({null_rig(), null_fit(), step}), ::testing::AllOf(HasSubstr("no answer: "), HasSubstr("does not move")));
+
+  step.channels.erase(std::find_if(step.channels.begin(), step.channels.end(), [](const Channel& c) { return c.name == "alpha"; }));
+  EXPECT_THAT(refusal({null_rig(), null_fit(), step}), ::testing::AllOf(HasSubstr("input: "), HasSubstr("alpha")));
+}
+
+TEST(Correct, RefusesTheFitOfAnotherRig) {
+  FittedRig other;
+  other.file = "other.json";
+  other.parameters.emplace_back();
+  other.parameters.back().name = "modal[1].stiffness";
+  EXPECT_THAT(refusal({null_rig(), other, read_run(test::null_campaign("step_a.csv"))}),
+              ::testing::AllOf(HasSubstr("other.json"), HasSubstr("normal.stiffness_scale")));
+}
+
+}  // namespace
+}  // namespace unrig
