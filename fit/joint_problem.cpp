@@ -1,10 +1,8 @@
 #include "fit/joint_problem.h"
 
-#include <ceres/ceres.h>
-
 #include <algorithm>
 #include <cmath>
-#include <memory>
+#include <limits>
 
 namespace unrig {
 namespace {
@@ -12,54 +10,6 @@ namespace {
 using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
-
-/// Ceres' view of one run: its unknowns in, its P + 1 compressed residuals out.
-class RunCost : public ceres::CostFunction {
- public:
-  RunCost(const RunResidual& run, VectorXd theta, std::vector<Index> parameters) : run_(run), theta_(std::move(theta)), parameters_(std::move(parameters)) {
-    set_num_residuals(static_cast<int>(theta_.size()) + 1);
-    for (std::size_t i = 0; i < parameters_.size(); ++i) mutable_parameter_block_sizes()->push_back(1);
-  }
-
-  bool Evaluate(double const* const* values, double* residuals, double** jacobians) const override {
-    VectorXd theta = theta_;
-    for (std::size_t i = 0; i < parameters_.size(); ++i) theta[parameters_[i]] = *values[i];
-    if (last_.theta.size() == 0 || last_.theta != theta) last_ = run_.solve(theta);
-    if (!std::isfinite(last_.chi2)) return false;  // an unstable model: the solver takes a shorter step
-    if (!jacobians) {
-      Eigen::Map<VectorXd> residual(residuals, num_residuals());
-      residual.setZero();
-      residual[num_residuals() - 1] = std::sqrt(last_.chi2);
-      return true;
-    }
-    const RunResidual::Evaluation e = run_.differentiate(last_);
-    Eigen::Map<VectorXd>(residuals, num_residuals()) = e.residual;
-    if (jacobians)
-      for (std::size_t i = 0; i < parameters_.size(); ++i)
-        if (jacobians[i]) Eigen::Map<VectorXd>(jacobians[i], num_residuals()) = e.jacobian.col(parameters_[i]);
-    return true;
-  }
-
- private:
-  const RunResidual& run_;
-  VectorXd theta_;
-  std::vector<Index> parameters_;
-  mutable RunResidual::Solution last_;  ///< the solver asks for the value first and for the derivative where the value was good
-};
-
-/// (value - centre) / width.
-class PriorCost : public ceres::SizedCostFunction<1, 1> {
- public:
-  PriorCost(double centre, double width) : centre_(centre), width_(width) {}
-  bool Evaluate(double const* const* values, double* residuals, double** jacobians) const override {
-    residuals[0] = (values[0][0] - centre_) / width_;
-    if (jacobians && jacobians[0]) jacobians[0][0] = 1 / width_;
-    return true;
-  }
-
- private:
-  double centre_, width_;
-};
 
 /// How far a first guess may reasonably be off: half of itself, or a twentieth for ratios that start near zero.
 double prior_width(double value) { return std::max(0.5 * std::abs(value), 0.05); }
@@ -75,6 +25,11 @@ JointProblem::JointProblem(const AeroelasticModel& model, std::vector<RunResidua
       if (parameters[j].per_run && runs_[r].conditions().speed > 0) unknowns_.push_back({static_cast<Index>(j), static_cast<int>(r), parameters[j].start, false, {}});
 }
 
+std::string JointProblem::name(const Unknown& unknown) const {
+  const std::string& parameter_name = parameter(unknown).name;
+  return unknown.run < 0 ? parameter_name : parameter_name + " (" + runs_[static_cast<std::size_t>(unknown.run)].run().file + ")";
+}
+
 VectorXd JointProblem::theta(std::size_t run) const {
   VectorXd theta = model_->start_values();
   for (const Unknown& u : unknowns_)
@@ -82,42 +37,71 @@ VectorXd JointProblem::theta(std::size_t run) const {
   return theta;
 }
 
-JointProblem::Summary JointProblem::solve(const SolveOptions& options) {
-  ceres::Problem problem;
-  for (Unknown& u : unknowns_) {
-    problem.AddParameterBlock(&u.value, 1);
+LeastSquaresProblem JointProblem::least_squares() const {
+  LeastSquaresProblem problem;
+  for (const Unknown& u : unknowns_) {
     const Parameter& p = parameter(u);
-    problem.SetParameterLowerBound(&u.value, 0, p.lower);
-    problem.SetParameterUpperBound(&u.value, 0, p.upper);
-    u.value = std::clamp(u.value, p.lower, p.upper);
-    if (u.held) problem.SetParameterBlockConstant(&u.value);
-    if (options.prior && !u.held) problem.AddResidualBlock(new PriorCost(u.value, prior_width(u.value)), nullptr, &u.value);
+    problem.unknowns.push_back({name(u), u.value, p.lower, p.upper, u.held, 0});
   }
   for (std::size_t r = 0; r < runs_.size(); ++r) {
+    ResidualTerm term;
     std::vector<Index> parameters;
-    std::vector<double*> blocks;
-    for (Unknown& u : unknowns_) {
-      if (u.run >= 0 && u.run != static_cast<int>(r)) continue;
-      parameters.push_back(u.parameter);
-      blocks.push_back(&u.value);
+    for (std::size_t i = 0; i < unknowns_.size(); ++i) {
+      if (unknowns_[i].run >= 0 && unknowns_[i].run != static_cast<int>(r)) continue;
+      term.unknowns.push_back(i);
+      parameters.push_back(unknowns_[i].parameter);
     }
-    problem.AddResidualBlock(new RunCost(runs_[r], model_->start_values(), parameters), nullptr, blocks);
+    term.size = static_cast<Index>(model_->parameters().size()) + 1;
+    term.evaluate = [&run = runs_[r], theta = model_->start_values(), parameters, last = RunResidual::Solution()](
+                        const VectorXd& values, VectorXd& residual, MatrixXd* jacobian) mutable {
+      theta(parameters) = values;
+      if (last.theta.size() == 0 || last.theta != theta) last = run.solve(theta);
+      if (!std::isfinite(last.chi2)) return false;  // an unstable model
+      if (jacobian == nullptr) {
+        residual[0] = std::sqrt(last.chi2);
+        return true;
+      }
+      const RunResidual::Evaluation e = run.differentiate(last);
+      residual = e.residual;
+      *jacobian = e.jacobian(Eigen::all, parameters);
+      return true;
+    };
+    problem.terms.push_back(std::move(term));
+    problem.degrees_of_freedom += static_cast<double>(runs_[r].degrees_of_freedom());
   }
-  ceres::Solver::Options solver;
-  solver.linear_solver_type = ceres::DENSE_QR;
-  solver.max_num_iterations = options.iterations;
-  solver.function_tolerance = options.tolerance;
-  solver.parameter_tolerance = 1e-10;
-  solver.gradient_tolerance = 1e-14;
-  solver.logging_type = ceres::SILENT;
-  ceres::Solver::Summary report;
-  ceres::Solve(solver, &problem, &report);
-  Summary summary;
-  summary.converged = report.termination_type == ceres::CONVERGENCE;
-  summary.chi2 = 2 * report.final_cost;
-  summary.evaluations = std::max(0, report.num_jacobian_evaluations);  // -1 where nothing was free
-  summary.message = report.message;
-  return summary;
+  for (const Unknown& u : unknowns_) problem.degrees_of_freedom -= u.held ? 0 : 1;
+  return problem;
+}
+
+JointProblem::Summary JointProblem::solve(const SolveOptions& options) {
+  LeastSquaresProblem problem = least_squares();
+  for (std::size_t i = 0; options.prior && i < unknowns_.size(); ++i) {
+    if (unknowns_[i].held) continue;
+    const LeastSquaresUnknown& u = problem.unknowns[i];
+    const double centre = std::clamp(u.value, u.lower, u.upper), width = prior_width(centre);
+    problem.terms.push_back({{i}, 1, [centre, width](const VectorXd& value, VectorXd& residual, MatrixXd* jacobian) {
+                               residual[0] = (value[0] - centre) / width;
+                               if (jacobian != nullptr) (*jacobian)(0, 0) = 1 / width;
+                               return true;
+                             }});
+  }
+  // Held unknowns need no derivatives during the search.
+  std::vector<Index> free;
+  for (const Unknown& u : unknowns_)
+    if (!u.held) free.push_back(u.parameter);
+  for (RunResidual& run : runs_) run.differentiate_only(free);
+  LeastSquaresOptions search;
+  search.iterations = options.iterations;
+  search.relative_change = options.tolerance;
+  // promised / chi2 < tolerance is a step of sqrt(tolerance dof) standard errors; a whole record deserves a hundredth of one.
+  search.precision = std::sqrt(options.tolerance * std::max(1.0, problem.degrees_of_freedom));
+  if (!options.prior) search.precision = std::min(search.precision, 0.01);
+  search.effort = options.restarts ? LeastSquaresOptions::Effort::until_arrived : LeastSquaresOptions::Effort::once;
+  search.evaluations = options.most_evaluations;
+  const LeastSquaresResult result = solve_least_squares(problem, search);
+  for (RunResidual& run : runs_) run.differentiate_only({});
+  for (std::size_t i = 0; i < unknowns_.size(); ++i) unknowns_[i].value = result.point.values[static_cast<Index>(i)];
+  return {result.arrived, result.point.finite ? result.chi2() : std::numeric_limits<double>::infinity(), result.evaluations, result.message};
 }
 
 double JointProblem::Linearisation::chi2() const {

@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "core/aeroelastic_model.h"
+#include "fit/least_squares.h"
 #include "fit/run_residual.h"
 
 namespace unrig {
@@ -36,7 +37,9 @@ class JointProblem {
   struct SolveOptions {
     bool prior = false;   ///< hold unknowns weakly near their present values, while a short window determines only some of them
     int iterations = 30;
-    double tolerance = 1e-7;  ///< relative change of chi-square at which the search ends
+    double tolerance = 1e-7;  ///< the search ends when the next step promises to lower chi-square by less than this fraction of it
+    bool restarts = false;    ///< where it does not arrive, try other ways (LeastSquaresOptions::Effort::until_arrived)
+    int most_evaluations = 400;
   };
   struct Summary {
     bool converged = false;
@@ -44,8 +47,15 @@ class JointProblem {
     int evaluations = 0;
     std::string message;
   };
-  /// Levenberg-Marquardt on all unknowns that are not held.
+  /// solve_least_squares over all unknowns that are not held.
   Summary solve(const SolveOptions& options);
+
+  /// The same as a plain least-squares problem at the present values, for `covariance` and `profile`. It looks at this object, which must outlive it
+  /// unchanged.
+  LeastSquaresProblem least_squares() const;
+
+  /// "normal_force_slope (step_a.csv)": a parameter, and the run it belongs to.
+  std::string name(const Unknown& unknown) const;
 
   /// Residual and Jacobian of all runs at the present values, one column per unknown (held ones too).
   struct Linearisation {
