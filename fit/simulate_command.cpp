@@ -91,6 +91,7 @@ SimulateProblem problem_of(const Options& options) {
   if (!options.fit.empty()) fit = read_fit(options.fit);
 
   SimulateProblem problem{{rig, basis_of(rig, run, fit, options), circulation_of(options, fit)}, {}, std::move(run), {}, {}, {}};
+  if (fit && !fit->effects.empty()) problem.model = problem.model.with_effects(fit->effects);
   problem.theta = fit ? theta_for(problem.model, *fit, problem.run.file) : problem.model.start_values();
   if (fit)
     if (const FittedParameter* steady = fit->find(steady_name, problem.run.file)) problem.steady_normal_force = steady->value;
