@@ -22,6 +22,7 @@ run build/unrig fit --rig $campaign/rig.toml \
 run build/unrig apparent-mass --rig $campaign/rig.toml --dry $campaign/dry_pluck.csv --wet $campaign/wet_pluck.csv -o $results/apparent.json
 run build/unrig correct --rig $campaign/rig.toml --fit $results/fit.json $campaign/step_a.csv \
   -o $results/step_a_corrected.csv --indicial $results/step_a_indicial.csv
+run build/unrig report $results/fit.json $results/apparent.json $results/step_a_corrected.csv $results/step_a_indicial.csv -o $results/report.html
 
 cat <<TEXT
 
@@ -30,5 +31,6 @@ The results are in $results:
   apparent.json          the apparent mass from the two free decays alone
   step_a_corrected.csv   the load that a rigid rig would have felt in step_a, with a standard deviation at each sample
   step_a_indicial.csv    the normalised step response
+  report.html            all of it to look at, in any browser, without a network
 The recordings are simulated, so the right answers are known: sample_data/campaigns/KEY.json, entry "null".
 TEXT

@@ -1,0 +1,208 @@
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+
+#include <fmt/format.h>
+
+#include "core/error.h"
+#include "correct/report/result_files.h"
+
+namespace unrig {
+namespace {
+
+using Eigen::Index;
+using Eigen::VectorXd;
+using nlohmann::json;
+
+json member(const json& object, const char* key, json otherwise) { return object.is_object() && object.contains(key) && !object[key].is_null() ? object[key] : otherwise; }
+
+std::vector<double> doubles(const json& values) {
+  std::vector<double> out;
+  for (const json& v : values) out.push_back(v.is_number() ? v.get<double>() : std::nan(""));
+  return out;
+}
+
+VectorXd vector(const json& values) {
+  const std::vector<double> v = doubles(values);
+  return Eigen::Map<const VectorXd>(v.data(), static_cast<Index>(v.size()));
+}
+
+/// The first of these members that is there.
+json any_of(const json& object, std::initializer_list<const char*> keys) {
+  for (const char* key : keys)
+    if (json found = member(object, key, nullptr); !found.is_null()) return found;
+  return json::array();
+}
+
+std::string listed(const json& names) {
+  std::string text;
+  for (const json& name : names) text += (text.empty() ? "" : ", ") + (name.is_string() ? name.get<std::string>() : name.dump());
+  return text;
+}
+
+void add_verdicts(ReportPage& page, const json& result, const std::string& about) {
+  const json mismatch = member(result, "mismatch", json::object()), missing = member(result, "missing", json::array());
+  const double p = number_of(mismatch, "p_value");
+  const std::string chance = std::isfinite(p) ? fmt::format(" (p = {:.2g})", p) : "";
+  if (!mismatch.value("found", false)) {
+    page.add_verdict(Tone::good, "Nothing is missing: the rig model explains these recordings" + chance + ".", about);
+  } else if (missing.empty()) {
+    page.add_verdict(Tone::bad, "Something is missing" + chance + ", and no known effect explains it.", about);
+  } else {
+    std::string what;
+    for (const json& m : missing) what += fmt::format("{}{} (probability {})", what.empty() ? "" : ", ", text_of(m, "effect"), plain(number_of(m, "probability"), 3));
+    page.add_verdict(Tone::bad, "Missing physics: " + what + ".", about);
+  }
+  if (!missing.empty() && result.value("unexplained", false)) page.add_verdict(Tone::open, "A significant mismatch remains that no known effect removes.", about);
+  for (const json& set : member(result, "equivalent", json::array()))
+    page.add_verdict(Tone::open, "These recordings cannot tell apart: " + listed(set) + ".", about);
+}
+
+/// "0.2 to 1.4 s": pairs, one per place of the mismatch.
+std::string range(const json& pairs, std::size_t i, const char* unit) {
+  if (i >= pairs.size() || !pairs[i].is_array() || pairs[i].size() != 2) return "";
+  const std::vector<double> ends = doubles(pairs[i]);
+  return fmt::format("{} to {} {}", plain(ends[0], 4), plain(ends[1], 4), unit);
+}
+
+void add_places(ReportPage& page, const json& mismatch) {
+  const json runs = member(mismatch, "runs", json::array()), time = member(mismatch, "time", json::array()), frequency = member(mismatch, "frequency", json::array());
+  if (const std::string summary = text_of(mismatch, "summary"); !summary.empty()) page.add_text(summary);
+  std::vector<std::vector<std::string>> rows;
+  for (std::size_t i = 0; i < std::max({runs.size(), time.size(), frequency.size()}); ++i)
+    rows.push_back({i < runs.size() ? file_name(listed(json::array({runs[i]}))) : "", range(time, i, "s"), range(frequency, i, "Hz")});
+  if (!rows.empty()) page.add_table("Where the mismatch is", {"run", "time", "frequency"}, rows);
+}
+
+void add_ranking(ReportPage& page, const json& ranking) {
+  std::vector<std::vector<std::string>> rows;
+  for (const json& r : ranking)
+    rows.push_back({text_of(r, "effect"), plain(number_of(r, "score"), 4), plain(number_of(r, "p_value"), 3), plain(number_of(r, "delta_bic"), 5)});
+  if (!rows.empty()) page.add_table("Ranking of the effects", {"effect", "score", "p-value", "change of BIC"}, rows, "The more negative the change of BIC, the more the effect explains for its parameters.");
+}
+
+void add_missing(ReportPage& page, const json& missing) {
+  std::vector<std::vector<std::string>> rows;
+  for (const json& m : missing) {
+    const std::string effect = text_of(m, "effect");
+    if (const std::string equation = text_of(m, "equation"); !equation.empty()) page.add_text(effect + ": " + equation);
+    for (const json& p : member(m, "parameters", json::array()))
+      rows.push_back({effect, text_of(p, "name"), with_error(number_of(p, "value"), number_of(p, "std_error")), text_of(p, "unit") == "1" ? "" : text_of(p, "unit")});
+  }
+  if (!rows.empty()) page.add_table("Parameters of what was missing", {"effect", "parameter", "value ± one standard error", "unit"}, rows);
+}
+
+void add_improvement(ReportPage& page, const json& improvement) {
+  std::vector<std::vector<std::string>> rows;
+  for (const json& r : member(improvement, "runs", json::array())) {
+    const double before = number_of(r, "rms_before"), after = number_of(r, "rms_after"), noise = number_of(r, "noise");
+    rows.push_back({file_name(text_of(r, "file")), member(r, "heldout", false).get<bool>() ? "held out" : "fitted", plain(before, 4), plain(after, 4), plain(noise, 4), text_of(r, "unit"),
+                    plain(before / noise, 3), plain(after / noise, 3)});
+  }
+  if (rows.empty()) return;
+  page.add_table("Residuals before and after", {"run", "", "before (r.m.s.)", "after (r.m.s.)", "noise (std)", "unit", "before / noise", "after / noise"}, rows,
+                 fmt::format("BIC {} before, {} after.", plain(number_of(improvement, "bic_before"), 7), plain(number_of(improvement, "bic_after"), 7)));
+}
+
+void add_time_frequency(ReportPage& page, const json& map) {
+  HeatMap heat{"Residual over time and frequency", "time [s]", "frequency [Hz]", labelled("power", text_of(map, "unit")), doubles(any_of(map, {"time"})), doubles(any_of(map, {"frequency"})), {}};
+  const json power = any_of(map, {"power"});
+  const std::size_t columns = heat.x.size(), lines = heat.y.size();
+  const bool by_time = power.size() == columns && power.size() != lines;
+  const auto fits = [&](std::size_t outer, std::size_t inner) {
+    return power.size() == outer && std::all_of(power.begin(), power.end(), [&](const json& row) { return row.size() == inner; });
+  };
+  if (columns == 0 || lines == 0 || !fits(by_time ? columns : lines, by_time ? lines : columns)) return page.add_text("Warning: the time-frequency map is incomplete and left out.");
+  heat.z.assign(lines, std::vector<double>(columns));
+  for (std::size_t j = 0; j < lines; ++j)
+    for (std::size_t i = 0; i < columns; ++i) {
+      const json& z = by_time ? power[i][j] : power[j][i];
+      heat.z[j][i] = z.is_number() ? z.get<double>() : std::nan("");
+    }
+  heat.log_z = true;
+  heat.caption = "Before any effect is added. Six decades of power at most.";
+  page.add_map(heat);
+}
+
+/// Force over displacement and velocity: a grid (one row per velocity) or single samples.
+void add_restoring_force(ReportPage& page, const json& map) {
+  const json x = any_of(map, {"displacement", "x"}), y = any_of(map, {"velocity", "y"}), z = any_of(map, {"force", "z"});
+  const std::string x_label = labelled("displacement", text_of(map, "displacement_unit")), y_label = labelled("velocity", text_of(map, "velocity_unit")),
+                    z_label = labelled("missing force", text_of(map, "force_unit").empty() ? text_of(map, "unit") : text_of(map, "force_unit"));
+  const bool grid = !z.empty() && z.front().is_array();
+  if (z.empty() || (grid ? z.size() != y.size() : z.size() != x.size() || z.size() != y.size())) return page.add_text("Warning: the restoring-force map is incomplete and left out.");
+  if (grid) {
+    HeatMap heat{"Restoring force that the model lacks", x_label, y_label, z_label, doubles(x), doubles(y), {}, "", false, true};
+    for (const json& row : z) heat.z.push_back(doubles(row));
+    return page.add_map(heat);
+  }
+  for (const auto& [values, label] : {std::pair{&x, &x_label}, std::pair{&y, &y_label}}) {
+    const VectorXd at = vector(*values), force = vector(z);
+    std::vector<Index> order(static_cast<std::size_t>(at.size()));
+    std::iota(order.begin(), order.end(), 0);
+    std::sort(order.begin(), order.end(), [&](Index a, Index b) { return at[a] < at[b]; });
+    page.add_plot({"Missing force against " + label->substr(0, label->find(' ')), *label, z_label, at(order), {{"missing force", 1, force(order), {}, false, true}}});
+  }
+}
+
+void add_diagnosed_traces(ReportPage& page, const json& t, const std::string& file, const std::string& unit) {
+  const VectorXd time = vector(member(t, "time", json::array())), measured = vector(member(t, "measured", json::array())), before = vector(member(t, "before", json::array())),
+                 after = vector(member(t, "after", json::array())), force = vector(member(t, "missing_force", json::array())), force_std = vector(member(t, "missing_force_std", json::array()));
+  const auto fits = [&](const VectorXd& x) { return x.size() == time.size() && time.size() > 1; };
+  if (!fits(measured)) return;
+  Plot records{"Recording and models", "time [s]", labelled("reading", unit), time, {{"recording", 0, measured}}, file};
+  Plot left{"Residuals", "time [s]", labelled("recording − model", unit), time, {}, file};
+  left.height = 200;
+  const auto add = [&](const char* name, int colour, const VectorXd& model, bool dashed) {
+    if (!fits(model)) return;
+    records.curves.push_back({fmt::format("model {}", name), colour, model, {}, dashed});
+    left.curves.push_back({fmt::format("residual {}", name), colour, measured - model});
+  };
+  add("before", 2, before, true);
+  add("after", 1, after, true);
+  page.add_plot(records);
+  if (!left.curves.empty()) page.add_plot(left);
+  if (fits(force)) page.add_plot({"Force that the model lacks", "time [s]", labelled("missing force", "N"), time, {{"missing force", 3, force, fits(force_std) ? force_std : VectorXd()}}, file});
+  const double dt = (time[time.size() - 1] - time[0]) / static_cast<double>(time.size() - 1);
+  if (fits(before) && fits(after))
+    add_spectra(page, "Spectra of the residual before and after", dt, unit, {"residual before", 2, measured - before}, {"residual after", 1, measured - after}, "Means removed, Hann window.");
+}
+
+/// What the file says of one run, wherever it says it: improvement.runs, or lists of their own.
+void add_run(ReportPage& page, const json& result, const json& run) {
+  const std::string file = text_of(run, "file");
+  json all = run;
+  for (const char* list : {"runs", "map", "maps", "traces"}) {
+    const json items = member(result, list, json::array());
+    if (!items.is_array()) continue;
+    for (const json& item : items) {
+      if (!item.is_object() || text_of(item, "file") != file) continue;
+      if (item.contains("measured")) all["traces"] = item;
+      if (item.contains("time_frequency") || item.contains("restoring_force")) all["map"] = item;
+      for (const char* key : {"traces", "map"})
+        if (item.contains(key)) all[key] = item[key];
+    }
+  }
+  const json traces = member(all, "traces", json::object()), map = member(all, "map", json::object());
+  if (traces.empty() && map.empty()) return;
+  page.add_section("Recording: " + file_name(file));
+  if (!traces.empty()) add_diagnosed_traces(page, traces, file, text_of(traces, "unit").empty() ? text_of(run, "unit") : text_of(traces, "unit"));
+  if (const json m = member(map, "time_frequency", json::object()); !m.empty()) add_time_frequency(page, m);
+  if (const json m = member(map, "restoring_force", json::object()); !m.empty()) add_restoring_force(page, m);
+}
+
+}  // namespace
+
+void add_diagnosis(ReportPage& page, const json& result, const std::string& path) {
+  if (!result.contains("mismatch") || !result.contains("missing")) throw InputError({path, 0}, "no \"mismatch\" or no \"missing\"", "wanted a diagnosis.json written by `unrig diagnose`", "");
+  add_verdicts(page, result, file_name(path));
+  page.add_section("Diagnosis: " + file_name(path));
+  add_places(page, result["mismatch"]);
+  add_missing(page, result["missing"]);
+  add_ranking(page, member(result, "ranking", json::array()));
+  const json improvement = member(result, "improvement", json::object());
+  add_improvement(page, improvement);
+  for (const json& run : member(improvement, "runs", json::array())) add_run(page, result, run);
+}
+
+}  // namespace unrig

@@ -1,0 +1,23 @@
+#pragma once
+#include <string>
+#include <vector>
+
+#include "core/rig.h"
+#include "core/run.h"
+#include "fit/fit_files.h"
+
+namespace unrig {
+
+/// A fitted channel of a run: what was recorded and what the model says, in SI.
+struct FitTrace {
+  std::string name, unit;
+  Eigen::VectorXd measured;  ///< NaN where missing
+  Eigen::VectorXd model;
+  double noise = 0;
+};
+
+/// The fitted channels of `run`, then `alpha` where the motion is estimated: the model of `fit`, its parameters held, with motion, initial state and
+/// offsets estimated from the run again. fit.json holds no traces: the record determines them, and they would make it as long as the recordings.
+std::vector<FitTrace> fit_traces(const Rig& rig, const FittedRig& fit, const Run& run);
+
+}  // namespace unrig

@@ -1,0 +1,72 @@
+#include "correct/report/report_command.h"
+
+#include <CLI/CLI.hpp>
+#include <fmt/format.h>
+
+#include "core/command.h"
+#include "core/error.h"
+#include "core/text_file.h"
+#include "correct/report/result_files.h"
+
+namespace unrig {
+namespace {
+
+using nlohmann::json;
+
+constexpr const char* wanted = "wanted what `unrig fit`, `apparent-mass`, `diagnose` or `correct` wrote with -o or --indicial";
+
+void add_json(ReportPage& page, const std::string& text, const std::string& path, const ReportOptions& options) {
+  const json result = json::parse(text, nullptr, false);
+  if (result.is_discarded()) throw InputError({path, 0}, "not valid JSON", wanted, "");
+  const std::string kind = text_of(result, "unrig");
+  try {
+    if (kind == "fit") return add_fit(page, result, path, options);
+    if (kind == "apparent-mass") return add_apparent_mass(page, result, path, options);
+    if (kind == "diagnosis") return add_diagnosis(page, result, path);
+  } catch (const json::exception& e) {
+    throw InputError({path, 0}, e.what(), wanted, "");
+  }
+  throw InputError({path, 0}, kind.empty() ? "no key \"unrig\"" : "a result of the kind \"" + kind + "\"", wanted, "");
+}
+
+void add_result(ReportPage& page, const std::string& path, const ReportOptions& options) {
+  const std::string text = read_text(path), header = text.substr(0, text.find('\n'));
+  if (const std::size_t first = text.find_first_not_of(" \t\r\n"); first != std::string::npos && text[first] == '{') return add_json(page, text, path, options);
+  if (header.starts_with("semichords,indicial")) return add_indicial(page, text, path);
+  if (header.find("normal_force_std") != std::string::npos) return add_corrected(page, text, path);
+  throw InputError({path, 1}, "neither JSON nor the header of a corrected record or an indicial response", wanted, "A recording itself is drawn with the fit.json that it belongs to.");
+}
+
+}  // namespace
+
+int report_command(int argc, char** argv) {
+  CLI::App app{"Shows results as one HTML file that opens from disk without a network: traces and residuals, spectra, parameters, verdicts.", "unrig report"};
+  std::vector<std::string> results;
+  std::string output, title;
+  ReportOptions options;
+  app.add_option("results", results, "fit.json, apparent.json, diagnosis.json, corrected.csv, indicial.csv, in any number and order")->required();
+  app.add_option("-o,--output", output, "report (HTML)")->required();
+  app.add_option("--data", options.data_folder, "folder of the recordings and the rig, where they are no longer at the paths that the results name");
+  app.add_option("--title", title, "title of the page, in place of the files' names");
+  app.footer("Example:\n  unrig report fit.json step_a_corrected.csv step_a_indicial.csv -o report.html");
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& e) {
+    return app.exit(e) == 0 ? exit_done : exit_wrong_use;
+  }
+  if (title.empty())
+    for (const std::string& path : results) title += (title.empty() ? "" : ", ") + file_name(path);
+  ReportPage page(title);
+  Progress progress;
+  for (const std::string& path : results) {
+    progress("drawing " + file_name(path));
+    add_result(page, path, options);
+  }
+  progress.clear();
+  const std::string html = page.html();
+  write_text(output, html);
+  fmt::print("{}: {} results, {:.2f} MB\n", output, results.size(), static_cast<double>(html.size()) / 1e6);
+  return exit_done;
+}
+
+}  // namespace unrig

@@ -1,0 +1,129 @@
+#include "correct/report/report_page.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdlib>
+#include <stdexcept>
+
+#include <fmt/format.h>
+
+namespace unrig {
+namespace {
+
+using Eigen::Index;
+using nlohmann::json;
+
+constexpr Index most_rows = 6000;
+
+/// As many digits as a plot can show; JSON knows no NaN.
+json rounded(double x, int digits = 6) {
+  if (!std::isfinite(x)) return nullptr;
+  return std::strtod(fmt::format("{:.{}g}", x, digits).c_str(), nullptr);
+}
+
+json numbers(const Eigen::VectorXd& values, const std::vector<Index>& rows, int digits = 6) {
+  json out = json::array();
+  for (const Index k : rows) out.push_back(rounded(values[k], digits));
+  return out;
+}
+
+json numbers(const std::vector<double>& values) {
+  json out = json::array();
+  for (const double x : values) out.push_back(rounded(x));
+  return out;
+}
+
+const char* name_of(Tone tone) { return tone == Tone::good ? "good" : tone == Tone::bad ? "bad" : "open"; }
+
+}  // namespace
+
+ReportPage::ReportPage(const std::string& title) {
+  data_ = {{"title", title}, {"version", "unrig " UNRIG_VERSION}, {"verdicts", json::array()}, {"blocks", json::array()}};
+}
+
+void ReportPage::add_verdict(Tone tone, const std::string& text, const std::string& about) {
+  data_["verdicts"].push_back({{"tone", name_of(tone)}, {"text", text}, {"about", about}});
+}
+
+void ReportPage::add_section(const std::string& title) { data_["blocks"].push_back({{"type", "section"}, {"title", title}}); }
+
+void ReportPage::add_text(const std::string& text) { data_["blocks"].push_back({{"type", "text"}, {"text", text}}); }
+
+void ReportPage::add_table(const std::string& title, const std::vector<std::string>& header, const std::vector<std::vector<std::string>>& rows,
+                           const std::string& caption) {
+  data_["blocks"].push_back({{"type", "table"}, {"title", title}, {"header", header}, {"rows", rows}, {"caption", caption}});
+}
+
+std::vector<Index> kept_rows(const Plot& plot, Index most) {
+  const Index rows = plot.x.size();
+  std::vector<Index> kept;
+  const Index stretches = std::max<Index>(1, most / std::max<Index>(1, 2 * static_cast<Index>(plot.curves.size())));
+  const Index bins = rows > most ? stretches : rows;
+  for (Index b = 0; b < bins; ++b) {
+    const Index first = b * rows / bins, last = (b + 1) * rows / bins;
+    if (last - first == 1) {
+      kept.push_back(first);
+      continue;
+    }
+    std::vector<Index> extremes;
+    for (const Curve& curve : plot.curves) {
+      Index low = -1, high = -1;
+      for (Index k = first; k < last; ++k) {
+        if (!std::isfinite(curve.value[k])) continue;
+        if (low < 0 || curve.value[k] < curve.value[low]) low = k;
+        if (high < 0 || curve.value[k] > curve.value[high]) high = k;
+      }
+      if (low >= 0) extremes.insert(extremes.end(), {low, high});
+    }
+    if (extremes.empty()) extremes.push_back(first);  // a gap stays a gap
+    std::sort(extremes.begin(), extremes.end());
+    extremes.erase(std::unique(extremes.begin(), extremes.end()), extremes.end());
+    kept.insert(kept.end(), extremes.begin(), extremes.end());
+  }
+  return kept;
+}
+
+void ReportPage::add_plot(const Plot& plot) {
+  for (const Curve& curve : plot.curves)
+    if (curve.value.size() != plot.x.size() || (curve.std.size() > 0 && curve.std.size() != plot.x.size()))
+      throw std::invalid_argument("the curve \"" + curve.name + "\" is not as long as its plot");
+  const std::vector<Index> rows = kept_rows(plot, most_rows);
+  std::string caption = plot.caption;
+  if (static_cast<Index>(rows.size()) < plot.x.size())
+    caption += fmt::format("{}Drawn from {} of {} samples: the extremes of every stretch.", caption.empty() ? "" : " ", rows.size(), plot.x.size());
+  json block = {{"type", "plot"},         {"title", plot.title},    {"x_label", plot.x_label}, {"y_label", plot.y_label}, {"group", plot.group},
+                {"caption", caption},     {"log_x", plot.log_x},    {"log_y", plot.log_y},     {"height", plot.height},   {"series", json::array()},
+                {"x", numbers(plot.x, rows, 9)}};
+  for (const Curve& curve : plot.curves) {
+    json series = {{"name", curve.name}, {"colour", curve.colour}, {"dashed", curve.dashed}, {"points", curve.points}, {"v", numbers(curve.value, rows)}};
+    if (curve.std.size() > 0) series["std"] = numbers(curve.std, rows, 3);
+    block["series"].push_back(series);
+  }
+  for (const auto& [x, name] : plot.marks) block["marks"].push_back({{"x", rounded(x)}, {"name", name}});
+  data_["blocks"].push_back(block);
+}
+
+void ReportPage::add_map(const HeatMap& map) {
+  json z = json::array();
+  for (const std::vector<double>& row : map.z) z.push_back(numbers(row));
+  data_["blocks"].push_back({{"type", "map"},           {"title", map.title},     {"x_label", map.x_label}, {"y_label", map.y_label},
+                             {"z_label", map.z_label},  {"x", numbers(map.x)},    {"y", numbers(map.y)},    {"z", z},
+                             {"caption", map.caption},  {"log_z", map.log_z},     {"signed", map.is_signed}});
+}
+
+std::string ReportPage::html() const {
+  // "<" within the data could end the script element.
+  std::string data;
+  for (const char c : data_.dump(-1, ' ', false, json::error_handler_t::replace)) {
+    if (c == '<')
+      data += "\\u003c";
+    else
+      data += c;
+  }
+  std::string page = report_page_template;
+  const std::string place = "/*UNRIG_DATA*/";
+  page.replace(page.find(place), place.size(), data);
+  return page;
+}
+
+}  // namespace unrig

@@ -1,0 +1,47 @@
+#pragma once
+#include <optional>
+#include <string>
+#include <vector>
+
+#include <nlohmann/json.hpp>
+
+#include "correct/report/report_page.h"
+
+namespace unrig {
+
+/// What the report is told besides the results.
+struct ReportOptions {
+  std::string data_folder;  ///< where recordings and rigs are looked for first; empty: where the results say
+};
+
+/// A file that a result names, wherever it is now: in `data_folder`, at the path that was recorded, at that path from the result's folder, or beside
+/// the result by its name. Empty where it is nowhere.
+std::optional<std::string> found_file(const std::string& recorded, const std::string& result_file, const ReportOptions& options);
+
+/// The file's name without folders.
+std::string file_name(const std::string& path);
+
+/// "1.1219 ± 0.0002": the value with two digits of its error; without an error six digits.
+std::string with_error(double value, double std_error);
+/// A number of a result, NaN where it is absent or null.
+double number_of(const nlohmann::json& object, const char* key);
+std::string text_of(const nlohmann::json& object, const char* key);
+/// Up to `digits` digits, an em dash where it is not finite.
+std::string plain(double x, int digits = 5);
+
+/// "time [s]"; no brackets where the unit is none.
+std::string labelled(const std::string& name, const std::string& unit);
+
+/// Sections of the page for one result each. `result` is the whole file, `path` where it lies. Throw InputError, naming the file, for what is not as
+/// `unrig` writes it; what the result only refers to (recordings) may be absent, which is warned of.
+void add_fit(ReportPage& page, const nlohmann::json& result, const std::string& path, const ReportOptions& options);
+void add_apparent_mass(ReportPage& page, const nlohmann::json& result, const std::string& path, const ReportOptions& options);
+void add_diagnosis(ReportPage& page, const nlohmann::json& result, const std::string& path);
+void add_corrected(ReportPage& page, const std::string& text, const std::string& path);
+void add_indicial(ReportPage& page, const std::string& text, const std::string& path);
+
+/// Amplitude spectra of two records on one grid, `dt` [s] apart, in the unit of the records: means removed, Hann window, missing samples bridged.
+void add_spectra(ReportPage& page, const std::string& title, double dt, const std::string& unit, const Curve& before, const Curve& after,
+                 const std::string& caption);
+
+}  // namespace unrig

@@ -1,0 +1,129 @@
+// The report in a browser: headless Chromium loads it from disk, a probe beside its script looks at the plots and zooms with the mouse, and the page
+// after all that is what --dump-dom prints. Skipped where there is no Chromium (sample_data/setup.sh --optional installs it).
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstdlib>
+
+#include "core/text_file.h"
+#include "tests/commands/report_results.h"
+
+namespace unrig {
+namespace {
+
+using nlohmann::json;
+using test::TemporaryDirectory;
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+
+/// Before every other script: keeps what the page complains of.
+constexpr const char* listen = R"(<script>
+window.complaints = [];
+window.addEventListener('error', (event) => complaints.push(String(event.message)));
+window.addEventListener('unhandledrejection', (event) => complaints.push(String(event.reason)));
+for (const kind of ['error', 'warn']) console[kind] = (...what) => complaints.push(kind + ': ' + what.join(' '));
+</script>)";
+
+/// After every other script: how many plots there are and whether each holds numbers and ink, what a drag across the first does to its whole group, and
+/// both themes.
+constexpr const char* probe = R"(<script>
+window.addEventListener('load', () => {  // all at once: --dump-dom comes right after the load
+  unrigReport.redraw.forEach((draw) => draw());
+  const found = {complaints, plots: []};
+  for (const [name, graph] of Object.entries(unrigReport.graphs)) {
+    const canvas = graph.canvas_.parentNode.querySelectorAll('canvas')[0];
+    const pixels = graph.hidden_.getContext('2d').getImageData(0, 0, graph.hidden_.width, graph.hidden_.height).data;
+    let ink = 0, numbers = 0;
+    for (let i = 3; i < pixels.length; i += 4) if (pixels[i] > 0) ++ink;
+    for (let k = 0; k < graph.numRows(); ++k) { const v = [].concat(graph.getValue(k, 1)); if (v.every((x) => x !== null && isFinite(x))) ++numbers; }
+    found.plots.push({name, rows: graph.numRows(), numbers, ink, x: graph.getOption('xlabel'), y: graph.getOption('ylabel'), range: graph.xAxisRange()});
+  }
+  const graphs = Object.values(unrigReport.graphs), first = graphs[0], second = graphs[1], other = graphs[graphs.length - 1];
+  const other_before = other.xAxisRange();
+  const box = first.canvas_.getBoundingClientRect(), area = first.getArea();
+  const mouse = (type, share, target) => target.dispatchEvent(new MouseEvent(type, {bubbles: true, cancelable: true, view: window, button: 0, buttons: 1,
+      clientX: box.left + area.x + share * area.w, clientY: box.top + area.y + area.h / 2, screenX: box.left + area.x + share * area.w, screenY: box.top + area.y + area.h / 2}));
+  mouse('mousedown', 0.25, first.mouseEventElement_);
+  mouse('mousemove', 0.4, document);
+  mouse('mousemove', 0.5, document);
+  mouse('mouseup', 0.5, document);
+  found.zoomed = [first.xAxisRange(), second.xAxisRange()];
+  found.other_stays = String(other.xAxisRange()) === String(other_before);
+  first.resetZoom();
+  found.reset = [first.xAxisRange(), second.xAxisRange()];
+  const paper = () => getComputedStyle(document.body).backgroundColor + ' ' + first.getColors()[1];
+  unrigReport.setTheme('light'); found.light = paper();
+  unrigReport.setTheme('dark'); found.dark = paper();
+  window.dispatchEvent(new Event('beforeprint')); found.printed = paper();
+  window.dispatchEvent(new Event('afterprint'));
+  found.maps = [...document.querySelectorAll('canvas.map')].map((c) => { const p = c.getContext('2d').getImageData(0, 0, c.width, c.height).data; const seen = new Set();
+    for (let i = 0; i < p.length; i += 4) seen.add((p[i] << 16) + (p[i + 1] << 8) + p[i + 2]); return seen.size; });
+  document.body.textContent = 'FOUND' + JSON.stringify(found) + 'END';
+});
+</script></body>)";
+
+std::string chromium() {
+  for (const char* name : {"chromium", "chromium-browser", "google-chrome"})
+    if (std::system((std::string("command -v ") + name + " >/dev/null 2>&1").c_str()) == 0) return name;
+  return "";
+}
+
+std::string replaced(std::string text, const std::string& what, const std::string& by) {
+  const std::size_t at = text.rfind(what);
+  EXPECT_NE(at, std::string::npos);
+  return text.replace(at, what.size(), by);
+}
+
+TEST(ReportInABrowser, LoadsDrawsAndZooms) {
+  const std::string browser = chromium();
+  if (browser.empty()) GTEST_SKIP() << "no Chromium on this machine; sample_data/setup.sh --optional installs it";
+  const TemporaryDirectory directory;
+  test::make_results(directory);
+  const std::string diagnosis = directory.file("diagnosis.json", test::made_up_diagnosis().dump()), report = directory.path("report.html");
+  ASSERT_EQ(test::run_unrig(directory, {"report", directory.path("fit.json"), diagnosis, directory.path("apparent.json"), directory.path("corrected.csv"), directory.path("indicial.csv"), "-o", report}).status, 0);
+  std::string page = read_text(report);
+  page = replaced(page, "<meta charset=\"utf-8\">", std::string("<meta charset=\"utf-8\">") + listen);
+  const std::string probed = directory.file("probed.html", replaced(page, "</body>", probe)), dom = directory.path("dom.html"), log = directory.path("log.txt");
+  // --no-zygote: as a daemon's child Chromium otherwise waits for a zygote that never answers. It must not find a network either.
+  const std::string command = "HOME=" + directory.path("") + " timeout 200 " + browser +
+                              " --headless --no-sandbox --no-zygote --disable-gpu --disable-dev-shm-usage --no-first-run --disable-background-networking"
+                              " --disable-component-update --host-resolver-rules='MAP * ~NOTFOUND' --window-size=1200,900 --enable-logging=stderr"
+                              " --user-data-dir=" + directory.path("profile") + " --dump-dom file://" + probed + " >" + dom + " 2>" + log;
+  ASSERT_EQ(std::system(command.c_str()), 0) << read_text(log);
+  const std::string text = read_text(dom);
+  const std::size_t first = text.find("FOUND{"), last = text.rfind("}END");
+  ASSERT_TRUE(first != std::string::npos && last != std::string::npos) << text.substr(0, 2000) << read_text(log);
+  const json found = json::parse(text.substr(first + 5, last - first - 4), nullptr, false);
+  ASSERT_FALSE(found.is_discarded()) << text.substr(first, 500);
+
+  EXPECT_EQ(found["complaints"], json::array());
+  for (const std::string line : {"CONSOLE:", "Uncaught"}) EXPECT_THAT(read_text(log), ::testing::Not(HasSubstr(line)));
+  ASSERT_GE(found["plots"].size(), 20u);
+  for (const json& plot : found["plots"]) {
+    EXPECT_GT(plot["rows"], 2) << plot;
+    EXPECT_GT(plot["numbers"].get<int>(), plot["rows"].get<int>() / 2) << plot;
+    EXPECT_GT(plot["ink"], 500) << plot;
+    EXPECT_THAT(plot["x"].get<std::string>(), HasSubstr("[")) << plot;
+  }
+  // The drag went from a quarter to half of the axis; a pixel on either side.
+  const double low = found["plots"][0]["range"][0], high = found["plots"][0]["range"][1], pixel = (high - low) / 800;
+  for (const json& range : found["zoomed"]) {
+    EXPECT_NEAR(range[0].get<double>(), low + (high - low) * 0.25, 2 * pixel);
+    EXPECT_NEAR(range[1].get<double>(), low + (high - low) * 0.5, 2 * pixel);
+  }
+  EXPECT_EQ(found["other_stays"], true);
+  for (const json& range : found["reset"]) {
+    EXPECT_NEAR(range[0].get<double>(), low, pixel);
+    EXPECT_NEAR(range[1].get<double>(), high, pixel);
+  }
+  EXPECT_THAT(found["light"].get<std::string>(), HasSubstr("rgb(255, 255, 255)"));
+  EXPECT_NE(found["dark"], found["light"]);
+  EXPECT_EQ(found["printed"], found["light"]);
+  ASSERT_EQ(found["maps"].size(), 2u);
+  for (const json& colours : found["maps"]) EXPECT_GT(colours, 6) << "a map of fewer colours than values";
+}
+
+}  // namespace
+}  // namespace unrig

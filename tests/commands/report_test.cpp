@@ -1,0 +1,153 @@
+// `unrig report`: what stands in the page for each kind of result, and what it refuses. How a browser shows it: report_browser_test.cpp.
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <filesystem>
+
+#include "core/text_file.h"
+#include "tests/commands/report_results.h"
+
+namespace unrig {
+namespace {
+
+using nlohmann::json;
+using test::Finished;
+using test::made_up_diagnosis;
+using test::make_results;
+using test::run_unrig;
+using test::TemporaryDirectory;
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+
+json page_data(const std::string& path) {
+  const std::string html = read_text(path), open = "id=\"report-data\">";
+  const std::size_t first = html.find(open) + open.size();
+  return json::parse(html.substr(first, html.find("</script>", first) - first));
+}
+
+std::vector<json> blocks(const json& data, const std::string& type) {
+  std::vector<json> found;
+  for (const json& block : data["blocks"])
+    if (block["type"] == type) found.push_back(block);
+  return found;
+}
+
+const json* plot_titled(const json& data, const std::string& title) {
+  for (const json& block : data["blocks"])
+    if (block["type"] == "plot" && block["title"] == title) return &block;
+  return nullptr;
+}
+
+TEST(Report, ShowsEveryResultOfTheChain) {
+  const TemporaryDirectory directory;
+  make_results(directory);
+  const std::string output = directory.path("report.html");
+  const Finished finished = run_unrig(directory, {"report", directory.path("fit.json"), directory.path("apparent.json"), directory.path("corrected.csv"), directory.path("indicial.csv"), "-o", output});
+  ASSERT_EQ(finished.status, 0) << finished.err;
+  EXPECT_THAT(finished.err, IsEmpty());
+  const json data = page_data(output);
+  EXPECT_EQ(data["verdicts"].size(), 4u);
+  EXPECT_THAT(data["verdicts"][0]["text"].get<std::string>(), HasSubstr("3 of 3 recordings"));
+
+  // The residual under the recording, in the same group, with the residual that fit.json reports.
+  const json fit = json::parse(read_text(directory.path("fit.json")));
+  std::size_t residuals = 0;
+  for (const json& run : fit["runs"])
+    for (const json& block : data["blocks"]) {
+      if (block["type"] != "plot" || block["group"] != run["file"] || block["title"] != "gauge: residual") continue;
+      ++residuals;
+      double sum = 0;
+      std::size_t count = 0;
+      for (const json& v : block["series"][0]["v"])
+        if (v.is_number()) sum += std::pow(v.get<double>(), 2), ++count;
+      // The motion is estimated again with nearly the same windows and spikes: r.m.s. within a standard deviation of its own, 1/sqrt(2 n).
+      EXPECT_NEAR(std::sqrt(sum / static_cast<double>(count)) / run["rms_residual"].get<double>(), 1, 1 / std::sqrt(2.0 * static_cast<double>(count)));
+    }
+  EXPECT_EQ(residuals, 3u);
+
+  for (const json& plot : blocks(data, "plot")) {
+    EXPECT_THAT(plot["x_label"].get<std::string>(), HasSubstr("[")) << "no unit on the axis of " << plot["title"];
+    for (const json& series : plot["series"]) EXPECT_EQ(series["v"].size(), plot["x"].size());
+  }
+  const json* indicial = plot_titled(data, "Indicial response against Wagner's");
+  ASSERT_TRUE(indicial);
+  EXPECT_TRUE((*indicial)["series"][0].contains("std"));
+  EXPECT_EQ((*indicial)["series"][1]["name"], "Wagner (exact)");
+  ASSERT_TRUE(plot_titled(data, "Spectra of the free decays"));
+  EXPECT_EQ((*plot_titled(data, "Spectra of the free decays"))["marks"].size(), 2u);
+  ASSERT_TRUE(plot_titled(data, "Gauge and the load of a rigid rig"));
+}
+
+TEST(Report, ShowsADiagnosis) {
+  const TemporaryDirectory directory;
+  const std::string file = directory.file("diagnosis.json", made_up_diagnosis().dump()), output = directory.path("report.html");
+  ASSERT_EQ(run_unrig(directory, {"report", file, "-o", output}).status, 0);
+  const json data = page_data(output);
+  EXPECT_EQ(data["verdicts"][0]["text"], "Missing physics: quadratic-drag (probability 0.99).");
+  EXPECT_EQ(data["verdicts"][1]["text"], "These recordings cannot tell apart: tank-wave, vortex-shedding.");
+  const std::vector<json> maps = blocks(data, "map");
+  ASSERT_EQ(maps.size(), 2u);
+  EXPECT_EQ(maps[0]["z"].size(), 3u);
+  EXPECT_EQ(maps[0]["z"][2][4], 20.0);
+  EXPECT_TRUE(maps[1]["z"][1][2].is_null());
+  EXPECT_EQ(blocks(data, "plot").size(), 4u);
+  EXPECT_EQ(blocks(data, "table").size(), 4u);
+}
+
+TEST(Report, ShowsADiagnosisOfTheMandatoryFieldsAlone) {
+  const TemporaryDirectory directory;
+  json nothing = {{"unrig", "diagnosis"}, {"mismatch", {{"found", false}, {"p_value", 0.4}, {"runs", json::array()}, {"time", json::array()}, {"frequency", json::array()}, {"summary", ""}}},
+                  {"missing", json::array()}, {"equivalent", json::array()}, {"unexplained", false}, {"improvement", {{"bic_before", 1}, {"bic_after", 1}, {"runs", json::array()}}}};
+  const std::string output = directory.path("report.html");
+  ASSERT_EQ(run_unrig(directory, {"report", directory.file("diagnosis.json", nothing.dump()), "-o", output}).status, 0);
+  EXPECT_EQ(page_data(output)["verdicts"][0]["text"], "Nothing is missing: the rig model explains these recordings (p = 0.4).");
+  nothing["mismatch"]["found"] = true;
+  ASSERT_EQ(run_unrig(directory, {"report", directory.file("diagnosis.json", nothing.dump()), "-o", output}).status, 0);
+  EXPECT_EQ(page_data(output)["verdicts"][0]["text"], "Something is missing (p = 0.4), and no known effect explains it.");
+}
+
+TEST(Report, SaysWhichRecordingsItDoesNotFindAndFindsThemInAFolder) {
+  const TemporaryDirectory directory;
+  make_results(directory);
+  json fit = json::parse(read_text(directory.path("fit.json")));
+  fit["rig"] = "gone/rig.toml";
+  for (json& run : fit["runs"]) run["file"] = "gone/" + std::filesystem::path(run["file"].get<std::string>()).filename().string();
+  const std::string moved = directory.file("moved.json", fit.dump()), output = directory.path("report.html");
+  const Finished without = run_unrig(directory, {"report", moved, "-o", output});
+  EXPECT_EQ(without.status, 0);
+  EXPECT_THAT(without.err, HasSubstr("gone/rig.toml"));
+  EXPECT_TRUE(blocks(page_data(output), "plot").empty());
+  const Finished with = run_unrig(directory, {"report", moved, "--data", test::null_campaign(""), "-o", output});
+  EXPECT_THAT(with.err, IsEmpty());
+  EXPECT_EQ(blocks(page_data(output), "plot").size(), 3u * 3 + 2);  // per run recording, residual, spectra; the step's angle twice more
+}
+
+TEST(Report, RefusesWhatIsNoResult) {
+  const TemporaryDirectory directory;
+  json bad_diagnosis = made_up_diagnosis();
+  bad_diagnosis["improvement"]["runs"][0]["heldout"] = "no";
+  const std::vector<std::pair<std::string, std::string>> bad{
+      {directory.path("absent.json"), "cannot be read"},
+      {directory.file("empty.json", ""), "neither JSON"},
+      {directory.file("cut.json", "{\"unrig\": \"fit\", "), "not valid JSON"},
+      {directory.file("list.json", "{}"), "no key"},
+      {directory.file("kind.json", "{\"unrig\": \"supper\"}"), "supper"},
+      {directory.file("fit.json", "{\"unrig\": \"fit\"}"), "parameters"},
+      {directory.file("apparent.json", "{\"unrig\": \"apparent-mass\"}"), "apparent_mass"},
+      {directory.file("diagnosis.json", "{\"unrig\": \"diagnosis\"}"), "mismatch"},
+      {directory.file("types.json", bad_diagnosis.dump()), "types.json"},
+      {directory.file("indicial.csv", "semichords,indicial,indicial_std\n1,0.5,0.01\n0.5,0.6,0.01\n"), "indicial.csv:3"},
+      {directory.file("corrected.csv", "time [s],normal_force_std [N]\n0,1\n1,2\n"), "gauge"},
+      {test::null_campaign("step_a.csv"), "fit.json"}};
+  for (const auto& [file, complaint] : bad) {
+    const Finished finished = run_unrig(directory, {"report", file, "-o", directory.path("report.html")});
+    EXPECT_EQ(finished.status, 2) << file;
+    EXPECT_THAT(finished.err, HasSubstr(complaint)) << file;
+    EXPECT_FALSE(std::filesystem::exists(directory.path("report.html"))) << file;
+  }
+}
+
+}  // namespace
+}  // namespace unrig
