@@ -1,5 +1,6 @@
 #pragma once
 #include <Eigen/Core>
+#include <vector>
 
 #include "core/aeroelastic_model.h"
 #include "core/motion.h"
@@ -16,14 +17,15 @@ namespace unrig {
 struct RigidLoad {
   Eigen::VectorXd circulatory;    ///< per sample [N]
   Eigen::VectorXd normal_force;   ///< circulatory + non-circulatory [N]
-  Eigen::MatrixXd circulatory_by_motion;   ///< samples x motion unknowns [N/rad]
+  Eigen::MatrixXd circulatory_by_motion;   ///< samples asked for x motion unknowns [N/rad]
   Eigen::MatrixXd normal_force_by_motion;
-  Eigen::MatrixXd circulatory_by_theta;    ///< samples x model parameters
+  Eigen::MatrixXd circulatory_by_theta;    ///< samples asked for x model parameters
   Eigen::MatrixXd normal_force_by_theta;
 };
 
-/// At theta of `model` (its slope, circulation and C_a act) for the motion with unknowns `u`. Throws std::invalid_argument for a modal rig.
+/// At theta of `model` (its slope, circulation and C_a act) for the motion with unknowns `u`; the load at every sample, its slopes at the samples
+/// `slopes_at` (ascending; empty: all). Throws std::invalid_argument for a modal rig.
 RigidLoad rigid_load(const AeroelasticModel& model, const Conditions& conditions, const Eigen::VectorXd& theta, const MotionBasis& motion, double dt,
-                     const Eigen::VectorXd& u);
+                     const Eigen::VectorXd& u, std::vector<Eigen::Index> slopes_at = {});
 
 }  // namespace unrig

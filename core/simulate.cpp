@@ -6,6 +6,8 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <numeric>
+#include <vector>
 
 #include "core/exact_step.h"
 #include "core/ideal_step.h"
@@ -88,10 +90,14 @@ MatrixXd inputs_of(const Run& run, const Conditions& conditions) {
   return input;
 }
 
-/// States that stay where they are under a constant column of drive: -A^-1 column, over the free states.
+/// States that stay where they are under a constant column of drive: -A^-1 column, over those that are at rest where the rig is.
 VectorXd static_state(const LinearSystem& system, const VectorXd& column) {
-  const Index n = system.free_states();
-  return -system.A.value.topLeftCorner(n, n).partialPivLu().solve(column.head(n));
+  std::vector<Index> at_rest(static_cast<std::size_t>(system.free_states()));
+  std::iota(at_rest.begin(), at_rest.end(), Index{0});
+  at_rest.insert(at_rest.end(), system.settling.begin(), system.settling.end());
+  VectorXd state = VectorXd::Zero(system.states());
+  state(at_rest) = -MatrixXd(system.A.value(at_rest, at_rest)).partialPivLu().solve(VectorXd(column(at_rest)));
+  return state;
 }
 
 /// A shaft that jumps: between jumps the pitch is constant, at a jump the states jump too.
@@ -120,14 +126,14 @@ MatrixXd response_to_inputs(const SimulateProblem& problem, const LinearSystem& 
   const MatrixXd input = inputs_of(problem.run, conditions);
   if (input.cols() == 0) return MatrixXd::Zero(problem.run.samples(), system.C.rows());
   VectorXd start = VectorXd::Zero(system.states());
-  if (problem.release_load) start.head(system.free_states()) = static_state(system, *problem.release_load * system.B.value.col(0));
+  if (problem.release_load) start = static_state(system, *problem.release_load * system.B.value.col(0));
   return drive(system, exact_step(system, problem.run.dt), DualMatrix(start), problem.run.samples(), {}, input, Partials::none).output;
 }
 
 /// Outputs in the steady state of the first angle.
 VectorXd steady_reading(const SimulateProblem& problem, const LinearSystem& system, double angle) {
   VectorXd reading = angle * system.C.value.col(system.motion);
-  reading += system.C.value.leftCols(system.free_states()) * static_state(system, angle * system.A.value.col(system.motion));
+  reading += system.C.value * static_state(system, angle * system.A.value.col(system.motion));
   const Rig& rig = problem.model.rig();
   if (problem.steady_normal_force && rig.gauge_element > 0)
     reading[0] = *problem.steady_normal_force * gauge_reading_of_unit_coefficient(rig, problem.run.density, problem.run.speed);

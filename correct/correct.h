@@ -5,6 +5,7 @@
 
 #include "core/rig.h"
 #include "core/run.h"
+#include "correct/indicial_response.h"
 #include "fit/fit_files.h"
 
 namespace unrig {
@@ -14,11 +15,15 @@ struct CorrectProblem {
   Rig rig;
   FittedRig fit;
   Run run;
+  double calibration_uncertainty = 0;  ///< of the gauge, relative, one standard deviation
 };
 
-/// Indicial response over semichords after a unit step of downwash; 1 at infinity.
-struct IndicialResponse {
-  Eigen::VectorXd semichords, value, std;
+/// A load over the record [N].
+struct CorrectedLoad {
+  Eigen::VectorXd value, std;
+  Eigen::MatrixXd by_source;  ///< samples x sources: the parts of std
+  double simultaneous = 0;    ///< the whole curve stays within this many std with a probability of 95 %
+  Eigen::VectorXd half_weight, twice_weight;  ///< the answer at half and at twice the regularisation's weight
 };
 
 struct CorrectResult {
@@ -28,15 +33,19 @@ struct CorrectResult {
   double semichords_per_second = 0;
   double force_per_coefficient = 0; ///< rho U^2 b L [N]: normal force per unit coefficient
   Eigen::VectorXd gauge;            ///< as recorded [N]
-  Eigen::VectorXd normal_force, normal_force_std;  ///< load of the rigid rig [N]
-  Eigen::VectorXd circulatory, circulatory_std;    ///< its circulatory part [N]
+  Eigen::VectorXd unexplained;      ///< the reading minus the model's [N]
+  CorrectedLoad normal_force;       ///< load of the rigid rig
+  CorrectedLoad circulatory;        ///< its circulatory part
   IndicialResponse indicial;
   double slope = 0, slope_std = 0;  ///< normal-force slope per radian, the limit of the response
   double reduced_chi2 = 0;
   double noise = 0;                 ///< of the gauge [N]
   double step = 0;                  ///< change of angle over the record [rad]
-  double trusted_from = 0;          ///< semichords from which on the indicial response is known to 5 %; infinity: nowhere
-  double prior_amplitude = 0;       ///< regularisation: standard deviation of each amplitude's prior
+  double prior_amplitude = 0;       ///< regularisation: standard deviation of the amplitudes' prior; its weight is 1 over the square
+  double determined = 0;            ///< number of amplitudes that the data determine
+  Eigen::Index amplitudes = 0;      ///< of so many
+  bool in_fit = false;              ///< the run took part in the fit
+  double calibration_uncertainty = 0;
   std::vector<std::string> warnings;
 };
 
@@ -44,13 +53,12 @@ struct CorrectResult {
 ///
 /// The build-up of circulation is 1 - sum_k A_k exp(-beta_k s) with rates beta_k spread evenly over ln s and free amplitudes: it acts in the load of
 /// the prescribed motion and in that of the rig's own motion, both at once in the coupled model. Amplitudes, slope and motion are estimated together from
-/// gauge and angle; the rig's parameters stay within their covariance. Each amplitude has a normal prior around zero of standard deviation
-/// `prior_amplitude`, wide against any physical response, which only decides what the record leaves open (responses slower than the
-/// record is long).
+/// gauge and angle. Each amplitude has a normal prior around zero whose standard deviation maximises the evidence (correct/prior.h); it decides what the
+/// record leaves open. The answers at half and at twice its weight, 1/tau^2, are part of the result.
 ///
-/// Standard deviations: gauge and angle noise, the rig's parameters with their correlations, and what the record leaves open, from the joint
-/// Gauss-Newton covariance, times the reduced chi-square where that exceeds one. The gauge's zero and the steady load cannot be told apart: the steady
-/// part of the load is the reading before the motion.
+/// Standard deviations by source: correct/uncertainty_budget.h. They are computed at up to some thousand samples, all of those in which the shaft moves as long as
+/// these are few, and interpolated between. The gauge's zero and the steady load cannot be told apart: the steady part of the load is the reading
+/// before the motion.
 /// Throws InputError where the run has no angle channel or no stream, NoAnswer where the angle does not move.
 CorrectResult correct(const CorrectProblem& problem);
 

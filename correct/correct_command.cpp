@@ -13,18 +13,21 @@ namespace unrig {
 int correct_command(int argc, char** argv) {
   CLI::App app{"Takes the rig out of a gauge record: the load of a rigid rig, its circulatory part, and the indicial response.", "unrig correct"};
   std::string rig_path, fit_path, run_path, output, indicial;
+  double calibration = 0;
   app.add_option("--rig", rig_path, "rig file (TOML)")->required();
   app.add_option("--fit", fit_path, "what `unrig fit` found (JSON)")->required();
   app.add_option("run", run_path, "run file (CSV) with angle and gauge, in a stream")->required();
   app.add_option("-o,--output", output, "corrected record (CSV)")->required();
   app.add_option("--indicial", indicial, "indicial response (CSV)");
+  app.add_option("--calibration-error", calibration, "relative standard deviation of the gauge's calibration")
+      ->check(CLI::Range(0.0, 1.0));
   app.footer("Example:\n  unrig correct --rig rig.toml --fit fit.json step_a.csv -o step_a_corrected.csv --indicial step_a_indicial.csv");
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& e) {
     return app.exit(e) == 0 ? exit_done : exit_wrong_use;
   }
-  const CorrectResult result = correct({read_rig(rig_path), read_fit(fit_path), read_run(run_path)});
+  const CorrectResult result = correct({read_rig(rig_path), read_fit(fit_path), read_run(run_path), calibration});
   for (const std::string& warning : result.warnings) warn(warning);
   write_text(output, to_csv(result));
   if (!indicial.empty()) write_text(indicial, to_indicial_csv(result));

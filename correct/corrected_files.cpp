@@ -8,47 +8,109 @@
 #include <fmt/format.h>
 
 namespace unrig {
+namespace {
+
+using Eigen::Index;
+
+/// Columns of a load beyond its value and standard deviation: the parts of the latter, 95 % band over the whole curve, other weights.
+std::string further_columns(const std::string& name, const std::string& unit) {
+  std::string header;
+  for (const char* source : source_names) header += fmt::format(",{}_std_{}{}", name, source, unit);
+  return header + fmt::format(",{}_band95{},{}_half_weight{},{}_twice_weight{}", name, unit, name, unit, name, unit);
+}
+
+template <class Out, class Row>
+void further_cells(Out out, const Row& by_source, double band, double half, double twice) {
+  for (Index s = 0; s < sources; ++s) fmt::format_to(out, ",{:.3g}", by_source[s]);
+  fmt::format_to(out, ",{:.4g},{:.6g},{:.6g}", band, half, twice);
+}
+
+}  // namespace
 
 std::string to_csv(const CorrectResult& r) {
-  std::string text = "time [s],semichords,gauge [N],normal_force [N],normal_force_std [N],circulatory [N],circulatory_std [N],cn,cn_std\n";
+  std::string text = "time [s],semichords,gauge [N],normal_force [N],normal_force_std [N],circulatory [N],circulatory_std [N],cn,cn_std";
+  text += further_columns("circulatory", " [N]") + further_columns("normal_force", " [N]") + ",unexplained [N]\n";
   auto out = std::back_inserter(text);
-  for (Eigen::Index k = 0; k < r.gauge.size(); ++k) {
+  const CorrectedLoad &normal = r.normal_force, &circulatory = r.circulatory;
+  for (Index k = 0; k < r.gauge.size(); ++k) {
     const double t = r.start + static_cast<double>(k) * r.dt;
-    fmt::format_to(out, "{:.6g},{:.6g},", t, (t - r.onset) * r.semichords_per_second);
+    fmt::format_to(out, "{:.9g},{:.6g},", t, (t - r.onset) * r.semichords_per_second);
     if (std::isfinite(r.gauge[k])) fmt::format_to(out, "{:.6g}", r.gauge[k]);
-    fmt::format_to(out, ",{:.6g},{:.4g},{:.6g},{:.4g},{:.6g},{:.4g}\n", r.normal_force[k], r.normal_force_std[k], r.circulatory[k], r.circulatory_std[k],
-                   r.normal_force[k] / r.force_per_coefficient, r.normal_force_std[k] / r.force_per_coefficient);
+    fmt::format_to(out, ",{:.6g},{:.4g},{:.6g},{:.4g},{:.6g},{:.4g}", normal.value[k], normal.std[k], circulatory.value[k], circulatory.std[k],
+                   normal.value[k] / r.force_per_coefficient, normal.std[k] / r.force_per_coefficient);
+    for (const CorrectedLoad* load : {&circulatory, &normal})
+      further_cells(out, load->by_source.row(k), load->simultaneous * load->std[k], load->half_weight[k], load->twice_weight[k]);
+    text += ',';
+    if (std::isfinite(r.unexplained[k])) fmt::format_to(out, "{:.4g}", r.unexplained[k]);
+    text += '\n';
   }
   return text;
 }
 
 std::string to_indicial_csv(const CorrectResult& r) {
-  std::string text = "semichords,indicial,indicial_std\n";
-  for (Eigen::Index i = 0; i < r.indicial.value.size(); ++i)
-    fmt::format_to(std::back_inserter(text), "{:.6g},{:.6g},{:.4g}\n", r.indicial.semichords[i], r.indicial.value[i], r.indicial.std[i]);
+  const IndicialResponse& response = r.indicial;
+  std::string text = "semichords,indicial,indicial_std" + further_columns("indicial", "") + ",cn_per_radian [1/rad],cn_per_radian_std [1/rad]\n";
+  auto out = std::back_inserter(text);
+  for (Index i = 0; i < response.value.size(); ++i) {
+    const Uncertainty& u = response.uncertainty;
+    fmt::format_to(out, "{:.6g},{:.6g},{:.4g}", response.semichords[i], response.value[i], u.std[i]);
+    further_cells(out, u.by_source.row(i), u.simultaneous * u.std[i], response.half_weight[i], response.twice_weight[i]);
+    fmt::format_to(out, ",{:.6g},{:.4g}\n", response.per_radian[i], response.per_radian_std[i]);
+  }
   return text;
 }
 
+namespace {
+
+std::string indicial_report(const CorrectResult& r) {
+  const IndicialResponse& response = r.indicial;
+  const Index last = response.value.size() - 1;
+  const auto at = [&](double s) {
+    Index i = 0;
+    while (i < last && response.semichords[i] < s) ++i;
+    return fmt::format("{:.4f} +/- {:.2g} at {:.3g}", response.value[i], response.uncertainty.std[i], response.semichords[i]);
+  };
+  std::string text = fmt::format("    indicial response    {}, {}, {}, {} semichords\n", at(0.5), at(2), at(8), at(30));
+  text += fmt::format("        at the step      {:.3f} +/- {:.2g} ({:+.1f} standard deviations from 1/2); 1 at infinity, which is the slope\n", response.at_step,
+                      response.at_step_std, (response.at_step - 0.5) / response.at_step_std);
+  if (std::isinf(response.steepest_fall))
+    text += "        monotone         it nowhere falls\n";
+  else
+    text += fmt::format("        monotone         it falls at {:.3g} semichords; one that never falls looks so with a probability of {:.2g}\n", response.steepest_fall,
+                        response.monotone_p);
+  text += std::isfinite(response.trusted_from) ? fmt::format("    known to 5 % from    {:.3g} semichords on\n", response.trusted_from)
+                                               : "    known to 5 %         nowhere in this record\n";
+  text += response.highest > 0 ? fmt::format("    usable bandwidth     {:.3g} to {:.3g} Hz (response to oscillation known to 5 %)\n", response.lowest, response.highest)
+                               : "    usable bandwidth     none (response to oscillation nowhere known to 5 %)\n";
+  return text;
+}
+
+std::string uncertainty_report(const CorrectResult& r) {
+  const Index last = r.circulatory.value.size() - 1;
+  std::string text = "    uncertainty          circulatory load at the end [N]:";
+  for (Index s = 0; s < sources; ++s) text += fmt::format(" {} {:.2g}{}", source_names[static_cast<std::size_t>(s)], r.circulatory.by_source(last, s), s + 1 < sources ? "," : "\n");
+  text += fmt::format("        95 % bands       1.96 standard deviations for a point, {:.2f} for the whole load, {:.2f} for the whole response\n", r.circulatory.simultaneous,
+                      r.indicial.uncertainty.simultaneous);
+  if (r.calibration_uncertainty == 0) text += "        calibration      taken as exact: no --calibration-error is given\n";
+  const auto change = [&](const Eigen::VectorXd& other) { return (other - r.indicial.value).cwiseAbs().maxCoeff(); };
+  text += fmt::format("    regularisation       amplitudes within 0 +/- {:.3g} by evidence; {:.1f} of {} determined by the data\n", r.prior_amplitude, r.determined, r.amplitudes);
+  text += fmt::format("        sensitivity      half its weight moves the response by at most {:.2g}, twice by {:.2g}\n", change(r.indicial.half_weight),
+                      change(r.indicial.twice_weight));
+  return text;
+}
+
+}  // namespace
+
 std::string report(const CorrectResult& r) {
   const double degrees = 180 / std::numbers::pi;
-  const Eigen::Index last = r.circulatory.size() - 1;
+  const Index last = r.circulatory.value.size() - 1;
   std::string text = fmt::format("[[Correction]] {}\n", std::filesystem::path(r.file).filename().string());
   text += fmt::format("    the angle changes by {:.4f} deg, from {:.4f} s on; {:.4g} semichords per second\n", r.step * degrees, r.onset, r.semichords_per_second);
   text += fmt::format("    gauge and angle are explained to a reduced chi-square of {:.3f} (gauge noise {:.3g} N)\n", r.reduced_chi2, r.noise);
-  text += fmt::format("    circulatory load     {:.4f} N before, {:.4f} +/- {:.2g} N at the end\n", r.circulatory[0], r.circulatory[last], r.circulatory_std[last]);
+  text += fmt::format("    rig parameters       {}\n", r.in_fit ? "as the fit left them: the run took part in it" : "those of the fit, adjusted within their errors");
+  text += fmt::format("    circulatory load     {:.4f} N before, {:.4f} +/- {:.2g} N at the end\n", r.circulatory.value[0], r.circulatory.value[last], r.circulatory.std[last]);
   text += fmt::format("    normal-force slope   {:.4f} +/- {:.2g} per radian (limit of the indicial response)\n", r.slope, r.slope_std);
-  const auto at = [&](double s) {
-    Eigen::Index i = 0;
-    while (i + 1 < r.indicial.value.size() && r.indicial.semichords[i] < s) ++i;
-    return fmt::format("{:.4f} +/- {:.2g} at {:.3g}", r.indicial.value[i], r.indicial.std[i], r.indicial.semichords[i]);
-  };
-  text += fmt::format("    indicial response    {}, {}, {} semichords\n", at(0.5), at(2), at(8));
-  if (std::isfinite(r.trusted_from))
-    text += fmt::format("    known to 5 % from    {:.3g} semichords on\n", r.trusted_from);
-  else
-    text += "    known to 5 % nowhere in this record\n";
-  text += fmt::format("    regularisation       amplitudes of the response within 0 +/- {:g} beforehand\n", r.prior_amplitude);
-  return text;
+  return text + indicial_report(r) + uncertainty_report(r);
 }
 
 }  // namespace unrig

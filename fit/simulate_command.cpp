@@ -9,6 +9,7 @@
 #include <optional>
 
 #include "core/command.h"
+#include "core/indicial_table.h"
 #include "core/run_text.h"
 #include "core/scan.h"
 #include "core/simulate.h"
@@ -24,13 +25,15 @@ using Eigen::Index;
 constexpr const char* steady_name = "steady_normal_force";
 
 struct Options {
-  std::string rig, run, fit, output, circulation, release_load;
+  std::string rig, run, fit, output, circulation, indicial, release_load;
   Index normal_modes = 0, torsion_modes = 0;
   std::vector<std::string> settings;
   bool jumps = false;
 };
 
-IndicialFunction circulation_of(const Options& options, const std::optional<FittedRig>& fit) {
+IndicialFunction circulation_of(const Options& options, const std::optional<FittedRig>& fit, const std::optional<TabulatedIndicial>& table) {
+  if (table && !options.circulation.empty()) throw InputError({"--wagner", 0}, "both --indicial and --wagner", "wanted one of them", "");
+  if (table) return table->function;
   if (options.circulation.empty()) return wagner(fit ? fit->circulation : Wagner::within_1e4);
   try {
     return wagner(wagner_from_name(options.circulation));
@@ -42,8 +45,8 @@ IndicialFunction circulation_of(const Options& options, const std::optional<Fitt
 /// The rig file's modes; a fit's where there is one; what the command line asks for above all.
 Basis basis_of(const Rig& rig, const Run& run, const std::optional<FittedRig>& fit, const Options& options) {
   if (rig.is_modal()) {
-    if (options.normal_modes + options.torsion_modes > 0 || !options.circulation.empty())
-      throw InputError({rig.file, 0}, "the rig is known only as modes", "wanted no --modes, --torsion-modes or --wagner for it", "");
+    if (options.normal_modes + options.torsion_modes > 0 || !options.circulation.empty() || !options.indicial.empty())
+      throw InputError({rig.file, 0}, "the rig is known only as modes", "wanted no --modes, --torsion-modes, --wagner or --indicial for it", "");
     return {};
   }
   const Basis asked = make_basis(rig, 0.5 / run.dt, run.density);
@@ -90,15 +93,34 @@ SimulateProblem problem_of(const Options& options) {
   std::optional<FittedRig> fit;
   if (!options.fit.empty()) fit = read_fit(options.fit);
 
-  SimulateProblem problem{{rig, basis_of(rig, run, fit, options), circulation_of(options, fit)}, {}, std::move(run), {}, {}, {}};
+  std::optional<TabulatedIndicial> table;
+  if (!options.indicial.empty()) table = read_indicial(options.indicial);
+
+  SimulateProblem problem{{rig, basis_of(rig, run, fit, options), circulation_of(options, fit, table)}, {}, std::move(run), {}, {}, {}};
   if (fit && !fit->effects.empty()) problem.model = problem.model.with_effects(fit->effects);
   problem.theta = fit ? theta_for(problem.model, *fit, problem.run.file) : problem.model.start_values();
   if (fit)
     if (const FittedParameter* steady = fit->find(steady_name, problem.run.file)) problem.steady_normal_force = steady->value;
+  if (table && table->slope && !rig.is_modal()) problem.theta[problem.model.index("normal_force_slope")] = *table->slope;
   for (const std::string& setting : options.settings) set(setting, problem);
   if (options.jumps) problem.pitch = PitchBetweenSamples::jumps;
   if (!options.release_load.empty()) problem.release_load = quantity(options.release_load, "N", {"--release-load", 0}, "the release load");
   return problem;
+}
+
+/// A recording beside its prediction, but for the zero of the channel: how far the two are apart.
+void print_comparison(const Run& recorded, const SimulateResult& result) {
+  for (const std::string& name : result.simulated) {
+    const Channel* channel = recorded.find(name);
+    if (!channel) continue;
+    const Eigen::ArrayXd simulated = result.run.channel(name).value;
+    std::vector<Index> there;
+    for (Index k = 0; k < channel->value.size(); ++k)
+      if (std::isfinite(channel->value[k])) there.push_back(k);
+    const Eigen::ArrayXd reading = channel->value(there), off = reading - simulated(there);
+    const auto scatter = [](const Eigen::ArrayXd& x) { return std::sqrt((x - x.mean()).square().mean()); };
+    fmt::print("  recorded {:<5} differs by {:.4g} {} r.m.s. beside a constant of {:.4g}; it varies by {:.4g} r.m.s.\n", name, scatter(off), channel->unit, off.mean(), scatter(reading));
+  }
 }
 
 /// What was assumed, for the head of the file: whoever reads it later can run it again.
@@ -142,6 +164,7 @@ int simulate_command(int argc, char** argv) {
   app.add_option("--fit", options.fit, "parameters, modes and circulation from a fit (JSON)");
   app.add_option("-o,--output", options.output, "simulated run (CSV)")->required();
   app.add_option("--wagner", options.circulation, "circulatory build-up: 1e-4 (default), 1e-6 (largest error), jones, seed");
+  app.add_option("--indicial", options.indicial, "circulatory build-up, and the slope, from the table that `unrig correct --indicial` writes");
   app.add_option("--modes", options.normal_modes, "normal modes, in place of the rig file's or the fit's")->check(CLI::PositiveNumber);
   app.add_option("--torsion-modes", options.torsion_modes, "torsional modes, likewise")->check(CLI::PositiveNumber);
   app.add_option("--set", options.settings, "name=value of a model parameter (formats as in fit.json), in SI; may be repeated");
@@ -159,6 +182,7 @@ int simulate_command(int argc, char** argv) {
   for (const std::string& warning : result.warnings) warn(warning);
   write_text(options.output, run_text(result.run, recipe(problem)));
   print_summary(problem, result, options.output);
+  print_comparison(problem.run, result);
   return exit_done;
 }
 

@@ -1,0 +1,156 @@
+#include "correct/uncertainty_budget.h"
+
+#include <Eigen/Eigenvalues>
+#include <Eigen/QR>
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+namespace unrig {
+namespace {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+/// R of rows whose columns may differ by many powers of ten.
+MatrixXd triangle(const MatrixXd& rows, VectorXd& scale) {
+  scale = rows.colwise().norm().transpose().cwiseMax(1e-300).cwiseInverse();
+  const Eigen::HouseholderQR<MatrixXd> qr(rows * scale.asDiagonal());
+  MatrixXd r = qr.matrixQR().topRows(std::min(rows.rows(), rows.cols())).triangularView<Eigen::Upper>();
+  r.conservativeResizeLike(MatrixXd::Zero(rows.cols(), rows.cols()));
+  constexpr double undetermined = 1e-11;  // as in RunResidual: what no row sees stays where it is
+  for (Index j = 0; j < r.cols(); ++j)
+    if (std::abs(r(j, j)) < undetermined) {
+      r.row(j).setZero();
+      r(j, j) = 1 / undetermined;
+    }
+  return r;
+}
+
+/// Columns whose products with themselves sum to (rows^T rows)^-1.
+MatrixXd inverse_root(const MatrixXd& rows) {
+  VectorXd scale;
+  const MatrixXd r = triangle(rows, scale);
+  return scale.asDiagonal() * MatrixXd(r.triangularView<Eigen::Upper>().solve(MatrixXd::Identity(r.rows(), r.cols())));
+}
+
+/// Information of the angle channel on c. A shaft that has come to rest adds one row with the weight of all.
+MatrixXd angle_information(const RunResidual& residual) {
+  const Index unknowns = residual.linear_unknowns(), motion = residual.motion().unknowns(), samples = residual.angle_weight().size();
+  constexpr Index block = 2048;
+  Index resting = 0;
+  for (const Interval& active : residual.motion().active()) resting = std::min(samples, active.last);
+  MatrixXd information = MatrixXd::Zero(unknowns, unknowns);
+  const auto add = [&](const Interval& range, const VectorXd& weight) {
+    MatrixXd rows = MatrixXd::Zero(range.length(), unknowns);
+    rows.leftCols(motion) = residual.motion().angle_columns(range);
+    rows.rightCols(1).setOnes();  // the angle before the motion comes last
+    rows = weight.asDiagonal() * rows;
+    information.selfadjointView<Eigen::Lower>().rankUpdate(rows.transpose());
+  };
+  for (Index first = 0; first < resting; first += block) {
+    const Interval range{first, std::min(resting, first + block)};
+    add(range, residual.angle_weight().segment(range.first, range.length()));
+  }
+  if (resting < samples) add({resting, resting + 1}, VectorXd::Constant(1, residual.angle_weight().tail(samples - resting).norm()));
+  return information.selfadjointView<Eigen::Lower>();
+}
+
+MatrixXd place(const MatrixXd& part, const std::vector<Index>& at, Index size) {
+  MatrixXd full = MatrixXd::Zero(size, part.cols());
+  full(at, Eigen::all) = part;
+  return full;
+}
+
+}  // namespace
+
+UncertaintyBudget::UncertaintyBudget(const RunResidual& residual, const RunResidual::Evaluation& e, const Prior& prior, const MatrixXd& motion_prior,
+                                     double calibration_uncertainty, double inflation) {
+  const Index parameters = e.jacobian.cols(), unknowns = e.linear.size();
+  // H^-1 = F F^T over (theta, c), with c = slope theta + what is left of it at given theta.
+  const MatrixXd known = prior.rows();
+  MatrixXd rows(e.jacobian.rows() + known.rows(), parameters);
+  rows << e.jacobian, known;
+  const MatrixXd theta_root = place(inverse_root(rows(Eigen::all, prior.free)), prior.free, parameters);
+  const MatrixXd c_root = inverse_root(e.linear_factor);
+  const Index thetas = theta_root.cols();
+  MatrixXd F = MatrixXd::Zero(parameters + unknowns, thetas + unknowns);
+  F.topLeftCorner(parameters, thetas) = theta_root;
+  F.bottomLeftCorner(unknowns, thetas) = e.linear_slope * theta_root;
+  F.bottomRightCorner(unknowns, unknowns) = c_root;
+
+  // Shares F^T I_s F; the gauge's is what is left of the identity.
+  const MatrixXd c_rows = F.bottomRows(unknowns), angle = c_rows.transpose() * angle_information(residual) * c_rows;
+  const auto share = [](const MatrixXd& a) -> MatrixXd { return a.transpose() * a; };
+  MatrixXd smoothing = share(prior.regularisation() * F.topRows(parameters));
+  if (motion_prior.rows() > 0) smoothing += share(motion_prior * c_rows);
+  const MatrixXd rig = share(prior.rig * F.topRows(parameters));
+  const MatrixXd gauge = MatrixXd::Identity(F.cols(), F.cols()) - angle - smoothing - rig;
+
+  const auto root_of_share = [&](const MatrixXd& a) -> MatrixXd {
+    const Eigen::SelfAdjointEigenSolver<MatrixXd> eigen(a);
+    return F * (eigen.eigenvectors() * eigen.eigenvalues().cwiseMax(0).cwiseSqrt().asDiagonal());
+  };
+  const auto source = [&](Source s) -> MatrixXd& { return by_source_[static_cast<std::size_t>(s)]; };
+  source(Source::gauge) = inflation * root_of_share(gauge);
+  source(Source::angle) = inflation * root_of_share(angle);
+  source(Source::regularisation) = root_of_share(smoothing);
+  source(Source::rig) = root_of_share(rig);
+  if (!prior.held.empty()) {
+    const MatrixXd held = e.jacobian(Eigen::all, prior.held) * prior.held_root;
+    const MatrixXd answer = place(prior.held_root, prior.held, parameters) - theta_root * (theta_root.transpose() * e.jacobian.transpose() * held);
+    source(Source::rig).resize(parameters + unknowns, held.cols());
+    source(Source::rig) << answer, e.linear_slope * answer;
+  }
+  VectorXd reading = VectorXd::Zero(F.cols());  // (0, c) in the coordinates of F
+  reading.tail(unknowns) = c_root.colPivHouseholderQr().solve(e.linear);
+  source(Source::calibration) = calibration_uncertainty * (F * (gauge * reading));
+
+  Index columns = 0;
+  for (const MatrixXd& s : by_source_) columns += s.cols();
+  root_.resize(F.rows(), columns);
+  Index at = 0;
+  for (const MatrixXd& s : by_source_) root_.middleCols(at, s.cols()) = s, at += s.cols();
+}
+
+Uncertainty UncertaintyBudget::of(const MatrixXd& by_theta, const MatrixXd& by_c) const {
+  MatrixXd rows(by_theta.rows(), by_theta.cols() + by_c.cols());
+  rows << by_theta, by_c;
+  Uncertainty u;
+  u.by_source.resize(rows.rows(), sources);
+  const MatrixXd all = rows * root_;
+  Index at = 0;
+  for (Index s = 0; s < sources; ++s) {
+    const Index width = by_source_[static_cast<std::size_t>(s)].cols();
+    u.by_source.col(s) = all.middleCols(at, width).rowwise().norm();
+    at += width;
+  }
+  u.std = u.by_source.rowwise().norm();
+  u.simultaneous = simultaneous_factor(all);
+  return u;
+}
+
+double curve_length(const MatrixXd& rows) {
+  double length = 0;
+  VectorXd before;
+  for (Index i = 0; i < rows.rows(); ++i) {
+    const double norm = rows.row(i).norm();
+    if (!(norm > 0)) continue;
+    const VectorXd here = rows.row(i).transpose() / norm;
+    // From the chord: the cosine of a small angle has no digits left.
+    if (before.size() > 0) length += 2 * std::asin(std::min(1.0, (here - before).norm() / 2));
+    before = here;
+  }
+  return length;
+}
+
+double simultaneous_factor(const MatrixXd& rows) {
+  const double length = curve_length(rows);
+  const auto beyond = [&](double c) { return length / std::numbers::pi * std::exp(-c * c / 2) + std::erfc(c / std::numbers::sqrt2); };
+  double low = 1, high = 10;
+  while (high - low > 1e-6) (beyond((low + high) / 2) > 0.05 ? low : high) = (low + high) / 2;
+  return high;
+}
+
+}  // namespace unrig

@@ -1,0 +1,58 @@
+#pragma once
+#include <Eigen/Core>
+#include <array>
+
+#include "correct/prior.h"
+#include "fit/run_residual.h"
+
+namespace unrig {
+
+/// Where the uncertainty of a corrected quantity comes from.
+enum class Source { gauge, angle, calibration, rig, regularisation };
+constexpr std::array source_names{"gauge", "angle", "calibration", "rig", "regularisation"};
+constexpr Eigen::Index sources = source_names.size();
+
+/// Standard deviations of quantities, one per row.
+struct Uncertainty {
+  Eigen::VectorXd std;          ///< total: root of the sum of squares
+  Eigen::MatrixXd by_source;    ///< quantities x sources
+  double simultaneous = 0;      ///< all quantities together stay within this many standard deviations with a probability of 95 %
+};
+
+/// The covariance of everything that was estimated from a run, z = (theta, c), split by source.
+///
+/// H = sum_s I_s is the Gauss-Newton information of z: I_s that of the gauge (with all other fitted channels), the angle, the rig's prior and the
+/// regularisation (amplitudes and roughness of the motion). The estimate moves by H^-1 A_s^T e_s with the errors e_s of source s, I_s = A_s^T A_s, so that
+///
+///   cov(z) = sum_s H^-1 I_s H^-1 = H^-1.
+///
+/// For a prior the same term is the square of the bias it causes, averaged over what the prior holds possible. Rig parameters that are held move z by
+/// -H^-1 H_r times their own error. A relative calibration error moves all weighted readings A_g c by itself: z by H^-1 I_g (0, c) times it.
+/// Noise counts `inflation` fold (the root of the reduced chi-square where that exceeds one).
+class UncertaintyBudget {
+ public:
+  UncertaintyBudget(const RunResidual& residual, const RunResidual::Evaluation& e, const Prior& prior, const Eigen::MatrixXd& motion_prior,
+                    double calibration_uncertainty, double inflation);
+
+  /// Of quantities that move with theta and c by these rows.
+  Uncertainty of(const Eigen::MatrixXd& by_theta, const Eigen::MatrixXd& by_c) const;
+
+  /// Columns over z whose products with themselves sum to the covariance.
+  const Eigen::MatrixXd& root() const { return root_; }
+
+ private:
+  Eigen::MatrixXd root_;  ///< over (theta, c)
+  std::array<Eigen::MatrixXd, static_cast<std::size_t>(sources)> by_source_;
+};
+
+/// Largest deviation, in standard deviations, that a Gaussian curve exceeds anywhere with a probability of 5 %: c with
+///
+///   (kappa / pi) exp(-c^2/2) + 2 (1 - Phi(c)) = 0.05,
+///
+/// kappa the length of the curve on the unit sphere, sum of the angles between neighbours (J. Sun and C. R. Loader, Ann. Statist. 22 (1994) 1328, Eq. 2.2; an upper bound
+/// by D. Q. Naiman, Ann. Statist. 14 (1986) 896). `rows`: one per point, rows times their transpose the covariance.
+double simultaneous_factor(const Eigen::MatrixXd& rows);
+/// That kappa.
+double curve_length(const Eigen::MatrixXd& rows);
+
+}  // namespace unrig

@@ -1,0 +1,247 @@
+// Do the bands of `unrig correct` hold what they say? Simulated runs with known load: everything that the bands claim to cover is drawn at random (gauge and
+// angle noise, rig parameters within the covariance of a fit, calibration), and the load is looked for inside its bands.
+//
+// The truth is simulated at a quarter of the sampling interval from an angle that is a formula, with a circulation that may not be Wagner's.
+//
+//   correct_study [--trials N] [--seed S]       table as Markdown on standard output; exit status 1 where coverage leaves its bounds
+
+#include <fmt/format.h>
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <numbers>
+#include <random>
+
+#include "core/command.h"
+#include "core/simulate.h"
+#include "core/text_file.h"
+#include "correct/correct.h"
+#include "fit/fit.h"
+#include "tests/support/sample_data.h"
+
+namespace unrig {
+namespace {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+struct Truth {
+  const char* name;
+  IndicialFunction circulation;
+};
+
+IndicialFunction slow_separation() {
+  IndicialFunction phi = wagner(Wagner::within_1e6);
+  const Index n = phi.rate.size();
+  phi.amplitude.conservativeResize(n + 2);
+  phi.rate.conservativeResize(n + 2);
+  phi.amplitude.tail(2) << -0.3, 0.3;
+  phi.rate.tail(2) << 0.1, 0.5;
+  return phi;
+}
+
+std::vector<Truth> truths() {
+  // Elliptic wings of aspect ratio 3 and 6: R. T. Jones, NACA Report 681 (1940), normalised to 1 at infinity.
+  return {{"Wagner", wagner(Wagner::within_1e6)},
+          {"elliptic wing, aspect ratio 3", {"span 3", VectorXd::Constant(1, 0.283), VectorXd::Constant(1, 0.540)}},
+          {"elliptic wing, aspect ratio 6", {"span 6", VectorXd::Constant(1, 0.361), VectorXd::Constant(1, 0.381)}},
+          {"slow separation: Wagner + 0.3 (exp(-s/10) - exp(-s/2))", slow_separation()}};
+}
+
+struct Shaft {
+  const char* name;
+  double (*angle)(double t);  ///< rad, at rest before 1 s
+};
+
+double smooth(double x) { return x <= 0 ? 0 : x >= 1 ? 1 : x * x * x * (10 - 15 * x + 6 * x * x); }
+double degrees(double x) { return x * std::numbers::pi / 180; }
+
+std::vector<Shaft> shafts() {
+  return {{"step of 1.3 deg in 40 ms, 5 % overshoot",
+           [](double t) {
+             const double since = t - 1.04;
+             return degrees(1.3) * (smooth((t - 1) / 0.04) + (since > 0 ? 0.05 * smooth(since / 0.02) * std::exp(-since / 0.03) * std::sin(since / 0.008) : 0));
+           }},
+          {"ramp of 3 deg in 0.6 s", [](double t) { return degrees(3) * smooth((t - 1) / 0.6); }},
+          {"up and down by 2 deg, five times in 2.5 s",
+           [](double t) { return t < 1 || t > 3.5 ? 0.0 : degrees(1) * smooth((t - 1) / 0.1) * smooth((3.5 - t) / 0.1) * (1 - std::cos(2 * std::numbers::pi * 2 * (t - 1))); }}};
+}
+
+constexpr double gauge_noise = 0.027, calibration_error = 0.005, dt = 0.002;
+constexpr Index samples = 3000, finer = 4;
+const double angle_noise = degrees(0.01);
+
+/// What one corrected run says about the bands.
+struct Count {
+  std::array<Index, 10> inside{}, all{};
+  Index trials = 0, whole_load = 0, response_points = 0, response_inside = 0, whole_response = 0;
+  double load_error = 0, response_error = 0, trusted_from = 0;
+};
+
+class Laboratory {
+ public:
+  explicit Laboratory(std::uint64_t seed) : rig_(read_rig(test::null_campaign("rig.toml"))), random_(seed) {
+    FitProblem problem;
+    problem.rig = rig_;
+    for (const char* run : {"dry_pluck", "wet_pluck", "step_a", "step_b", "step_c"}) problem.runs.push_back(read_run(test::null_campaign(std::string(run) + ".csv")));
+    const FitResult result = fit(problem);
+    fit_.normal_modes = result.normal_modes;
+    fit_.torsion_modes = result.torsion_modes;
+    for (std::size_t i = 0; i < result.parameters.size(); ++i)
+      if (result.parameters[i].run.empty()) chosen_.push_back(static_cast<Index>(i)), fit_.parameters.push_back(result.parameters[i]);
+    fit_.correlation = result.correlation(chosen_, chosen_);
+    slope_ = 5.86;
+  }
+
+  void look(const Truth& truth, const Shaft& shaft, Count& count) {
+    const AeroelasticModel model(rig_, make_basis(rig_, fit_.normal_modes, fit_.torsion_modes), truth.circulation);
+    Run run = quiet(shaft);
+    VectorXd theta = theta_for(model, fit_, "");
+    theta[model.index("normal_force_slope")] = slope_;
+    const SimulateResult simulated = simulate({model, theta, run, PitchBetweenSamples::spline, std::nullopt, 0.2});
+    const Eigen::VectorXi coarse = Eigen::VectorXi::LinSpaced(samples, 0, static_cast<int>(finer * (samples - 1)));
+    const VectorXd load = simulated.run.channel("circulatory").value(coarse);
+    run.dt = dt;
+    run.channels.front().value = run.channels.front().value(coarse).eval() + noise(angle_noise);
+    run.channels.push_back({"gauge", "N", "N", 1, (1 + calibration_error * normal_(random_)) * simulated.run.channel("gauge").value(coarse) + noise(gauge_noise), 0});
+
+    const CorrectResult result = correct({rig_, drawn(), run, calibration_error});
+    const VectorXd off = (result.circulatory.value - load).cwiseAbs();
+    bool whole = true;
+    for (Index k = 0; k < samples; ++k) {
+      const auto tenth = static_cast<std::size_t>(10 * k / samples);
+      ++count.all[tenth];
+      count.inside[tenth] += off[k] < 1.96 * result.circulatory.std[k] ? 1 : 0;
+      whole = whole && off[k] < result.circulatory.simultaneous * result.circulatory.std[k];
+    }
+    ++count.trials;
+    count.whole_load += whole ? 1 : 0;
+    count.load_error += off.squaredNorm() / static_cast<double>(samples) / std::pow(load.maxCoeff() - load.minCoeff(), 2);
+    look_at_response(truth, result.indicial, count);
+  }
+
+ private:
+  void look_at_response(const Truth& truth, const IndicialResponse& response, Count& count) const {
+    bool whole = true;
+    double sum = 0;
+    Index points = 0;
+    for (Index i = 0; i < response.value.size(); ++i) {
+      const double off = std::abs(response.value[i] - truth.circulation(response.semichords[i])), deviation = response.uncertainty.std[i];
+      whole = whole && off < response.uncertainty.simultaneous * deviation;
+      if (response.semichords[i] < 0.5) continue;
+      ++points;
+      sum += off * off;
+      count.response_inside += off < 1.96 * deviation ? 1 : 0;
+    }
+    count.response_points += points;
+    count.response_error += sum / static_cast<double>(points);
+    count.whole_response += whole ? 1 : 0;
+    count.trusted_from += std::min(response.trusted_from, 100.0);
+  }
+
+  Run quiet(const Shaft& shaft) const {
+    Run run;
+    run.file = "simulated.csv";
+    run.medium = "water";
+    run.density = 998.2;
+    run.speed = 0.6096;
+    run.dt = dt / finer;
+    VectorXd angle(finer * samples);
+    for (Index k = 0; k < angle.size(); ++k) angle[k] = degrees(2) + shaft.angle(run.time(k));
+    run.channels.push_back({"alpha", "rad", "rad", 1, angle, 0});
+    return run;
+  }
+
+  /// The fit as it might have come out.
+  FittedRig drawn() {
+    FittedRig fit = fit_;
+    const VectorXd move = MatrixXd(fit_.correlation.llt().matrixL()) * VectorXd::NullaryExpr(fit_.correlation.rows(), [&](Index) { return normal_(random_); });
+    for (std::size_t i = 0; i < fit.parameters.size(); ++i)
+      if (fit.parameters[i].std_error > 0) fit.parameters[i].value += fit.parameters[i].std_error * move[static_cast<Index>(i)];
+    return fit;
+  }
+
+  VectorXd noise(double sigma) {
+    return VectorXd::NullaryExpr(samples, [&](Index) { return sigma * normal_(random_); });
+  }
+
+  Rig rig_;
+  FittedRig fit_;
+  std::vector<Index> chosen_;
+  double slope_ = 0;
+  std::mt19937_64 random_;
+  std::normal_distribution<double> normal_;
+};
+
+double share(Index part, Index whole) { return 100 * static_cast<double>(part) / static_cast<double>(whole); }
+
+/// One line of the table.
+void print(const std::string& name, const Count& c) {
+  Index inside = 0, all = 0;
+  double worst = 100;
+  for (std::size_t i = 0; i < c.all.size(); ++i) inside += c.inside[i], all += c.all[i], worst = std::min(worst, share(c.inside[i], c.all[i]));
+  const auto n = static_cast<double>(c.trials);
+  fmt::print("| {} | {:.1f} | {:.1f} | {:.0f} | {:.2f} | {:.1f} | {:.0f} | {:.4f} | {:.2f} |\n", name, share(inside, all), worst, share(c.whole_load, c.trials),
+             100 * std::sqrt(c.load_error / n), share(c.response_inside, c.response_points), share(c.whole_response, c.trials), std::sqrt(c.response_error / n), c.trusted_from / n);
+  std::fflush(stdout);
+}
+
+void add(const Count& one, Count& sum) {
+  for (std::size_t i = 0; i < one.all.size(); ++i) sum.inside[i] += one.inside[i], sum.all[i] += one.all[i];
+  sum.trials += one.trials, sum.whole_load += one.whole_load, sum.whole_response += one.whole_response;
+  sum.response_points += one.response_points, sum.response_inside += one.response_inside;
+  sum.load_error += one.load_error, sum.response_error += one.response_error, sum.trusted_from += one.trusted_from;
+}
+
+/// 0 where the pooled coverage is 93 to 97 % and no tenth of the record is below 85 %, both within what chance does to so few runs.
+int judge(const Count& c) {
+  // Errors of a run hang together: it counts for about three independent numbers, so that the pooled share scatters by sqrt(0.05 0.95 / (3 trials)).
+  const double chance = 300 * std::sqrt(0.05 * 0.95 / (3 * static_cast<double>(c.trials))), chance_tenth = 300 * std::sqrt(0.15 * 0.85 / static_cast<double>(c.trials));
+  Index inside = 0, all = 0;
+  bool good = true;
+  for (std::size_t i = 0; i < c.all.size(); ++i) {
+    inside += c.inside[i], all += c.all[i];
+    good = good && share(c.inside[i], c.all[i]) > 85 - chance_tenth;
+  }
+  return good && share(inside, all) > 93 - chance && share(inside, all) < 97 + chance ? 0 : 1;
+}
+
+}  // namespace
+}  // namespace unrig
+
+int main(int argc, char** argv) {
+  CLI::App app{"Coverage of the bands of `unrig correct`, by simulation."};
+  int trials = 2;
+  std::uint64_t seed = 1;
+  app.add_option("--trials", trials, "runs per truth and motion")->check(CLI::PositiveNumber);
+  app.add_option("--seed", seed, "of the random numbers");
+  CLI11_PARSE(app, argc, argv);
+
+  unrig::Laboratory laboratory(seed);
+  unrig::Progress progress;
+  const auto began = std::chrono::steady_clock::now();
+  fmt::print("| truth; motion | load: inside its 95 % band, % | worst tenth of the record, % | whole load inside, % of runs | r.m.s. error, % of the load's range | response from 0.5 "
+             "semichords: inside, % | whole response inside, % of runs | r.m.s. error | known to 5 % from, semichords |\n| --- | --- | --- | --- | --- | --- | --- | --- | --- |\n");
+  unrig::Count pooled;
+  int done = 0;
+  const std::vector<unrig::Truth> truths = unrig::truths();
+  const std::vector<unrig::Shaft> shafts = unrig::shafts();
+  for (const unrig::Truth& truth : truths)
+    for (const unrig::Shaft& shaft : shafts) {
+      unrig::Count count;
+      for (int i = 0; i < trials; ++i, ++done) {
+        const double spent = std::chrono::duration<double>(std::chrono::steady_clock::now() - began).count();
+        const double all = static_cast<double>(trials) * static_cast<double>(truths.size() * shafts.size());
+        progress(fmt::format("{} of {:.0f} runs, {:.0f} s left", done, all, done > 0 ? spent / done * (all - done) : 0));
+        laboratory.look(truth, shaft, count);
+      }
+      progress.clear();
+      unrig::print(std::string(truth.name) + "; " + shaft.name, count);
+      unrig::add(count, pooled);
+    }
+  unrig::print("**all**", pooled);
+  return unrig::judge(pooled);
+}
