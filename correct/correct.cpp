@@ -48,31 +48,15 @@ AeroelasticModel free_model(const CorrectProblem& problem, double semichords) {
 }
 
 /// The best theta with noise levels, roughness of the motion and weight of the regularisation learned on the way.
-struct Estimate {
-  VectorXd theta;
-  Prior prior;
-  MatrixXd motion_prior;
-  double determined = 0;
-};
-
-Estimate estimate(RunResidual& residual, Prior prior, VectorXd theta) {
-  constexpr int most_rounds = 6;
-  constexpr double settled = 0.02;
+Search estimate(RunResidual& residual, const Prior& prior, const VectorXd& start, MatrixXd& rough) {
+  constexpr double roughly = 1, well = 1e-3;  // of a chi-square whose own scatter is some tens
   residual.differentiate_only(prior.free);
-  theta = minimise(residual, prior, theta);
+  const VectorXd theta = minimise(residual, prior, start, roughly, false).solution.theta;
   residual.settle_noise(theta);
   residual.reject_spikes(theta);
-  const MatrixXd rough = motion_prior(residual, theta);
+  rough = motion_prior(residual, theta);
   residual.set_motion_prior(rough);
-  Evidence weight;
-  for (int round = 0; round < most_rounds; ++round) {
-    theta = minimise(residual, prior, theta);
-    weight = evidence(residual.evaluate(theta, Partials::all), prior, theta);
-    const double change = std::abs(std::log(weight.amplitude / prior.amplitude));
-    prior.amplitude = weight.amplitude;
-    if (change < settled) break;
-  }
-  return {minimise(residual, prior, theta), prior, rough, weight.determined};
+  return minimise(residual, prior, theta, well, true);
 }
 
 /// Samples at which standard deviations are computed: those of a moving shaft, no more than some thousand, and ever fewer while it rests.
@@ -136,16 +120,17 @@ CorrectedLoad corrected_load(const RunResidual& residual, const UncertaintyBudge
   return {value, interpolated(u.std, at, value.size()), interpolated(u.by_source, at, value.size()), u.simultaneous, {}, {}};
 }
 
-/// The answers at half and at twice the weight of the regularisation.
-void vary_weight(const RunResidual& residual, const Estimate& best, CorrectResult& result) {
+/// The answers at half and at twice the weight of the regularisation, by one step from the best.
+void vary_weight(const RunResidual& residual, const Search& best, CorrectResult& result) {
+  const VectorXd& theta = best.solution.theta;
   for (const bool half : {true, false}) {
     Prior prior = best.prior;
     prior.amplitude *= half ? std::sqrt(2.0) : std::sqrt(0.5);
-    const VectorXd theta = minimise(residual, prior, best.theta);
-    const RigidLoad load = load_at(residual, theta, residual.evaluate(theta, Partials::none).linear, {0});
+    const VectorXd move = gauss_newton_step(best.evaluation, prior, theta);
+    const RigidLoad load = load_at(residual, theta + move, best.evaluation.linear + best.evaluation.linear_slope * move, {0});
     (half ? result.circulatory.half_weight : result.circulatory.twice_weight) = load.circulatory;
     (half ? result.normal_force.half_weight : result.normal_force.twice_weight) = load.normal_force;
-    (half ? result.indicial.half_weight : result.indicial.twice_weight) = indicial_values(residual.model(), theta, result.indicial.semichords);
+    (half ? result.indicial.half_weight : result.indicial.twice_weight) = indicial_values(residual.model(), theta + move, result.indicial.semichords);
   }
 }
 
@@ -186,29 +171,31 @@ CorrectResult correct(const CorrectProblem& problem) {
 
   RunResidual residual(model, run, windows);
   const VectorXd start = theta_for(model, problem.fit, run.file);
-  const Estimate best = estimate(residual, prior_of(model, problem.fit, start, run.file), start);
+  MatrixXd rough;
+  const Search best = estimate(residual, prior_of(model, problem.fit, start, run.file), start, rough);
+  const VectorXd& theta = best.solution.theta;
 
   RunResidual complete = residual;
   complete.differentiate_only({});
-  const RunResidual::Evaluation e = complete.evaluate(best.theta, Partials::all);
+  const RunResidual::Evaluation e = complete.differentiate(best.solution);
   result.reduced_chi2 = e.chi2 / static_cast<double>(residual.degrees_of_freedom() - static_cast<Index>(best.prior.free.size()));
   const double inflation = std::sqrt(std::max(1.0, result.reduced_chi2));
-  const UncertaintyBudget budget(residual, e, best.prior, best.motion_prior, result.calibration_uncertainty, inflation);
+  const UncertaintyBudget budget(residual, e, best.prior, rough, result.calibration_uncertainty, inflation);
 
   const std::vector<Index> at = chosen_samples(residual.motion());
-  const RigidLoad load = load_at(residual, best.theta, e.linear, at);
+  const RigidLoad load = load_at(residual, theta, e.linear, at);
   result.circulatory = corrected_load(residual, budget, load.circulatory, load.circulatory_by_theta, load.circulatory_by_motion, at);
   result.normal_force = corrected_load(residual, budget, load.normal_force, load.normal_force_by_theta, load.normal_force_by_motion, at);
-  result.indicial = indicial_response(model, best.theta, budget, length, result.semichords_per_second);
+  result.indicial = indicial_response(model, theta, budget, length, result.semichords_per_second);
   vary_weight(residual, best, result);
 
-  const RunResidual::Prediction prediction = residual.predict(best.theta);
+  const RunResidual::Prediction prediction = residual.predict(theta);
   result.unexplained = result.gauge - prediction.output.col(0);
   result.noise = residual.sigma(0);
   result.step = prediction.motion.angle[prediction.motion.angle.size() - 1];
   result.onset = onset_of(prediction.motion, run);
   const Index slope = model.index("normal_force_slope");
-  result.slope = best.theta[slope];
+  result.slope = theta[slope];
   result.slope_std = budget.root().row(slope).norm();
   result.prior_amplitude = best.prior.amplitude;
   result.determined = best.determined;

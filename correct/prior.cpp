@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
+#include <utility>
 
 namespace unrig {
 namespace {
@@ -46,8 +47,16 @@ MatrixXd root_of(const MatrixXd& covariance) {
   return deviation.asDiagonal() * MatrixXd(correlation.llt().matrixL());
 }
 
-double cost(const RunResidual& residual, const Prior& prior, const VectorXd& theta) {
-  return residual.evaluate(theta, Partials::none).chi2 + (prior.rows() * (theta - prior.mean)).squaredNorm();
+double cost(double chi2, const Prior& prior, const VectorXd& theta) { return chi2 + (prior.rows() * (theta - prior.mean)).squaredNorm(); }
+
+/// Data and prior, linearised: residuals | J d theta, over all parameters.
+std::pair<VectorXd, MatrixXd> linear_model(const RunResidual::Evaluation& e, const Prior& prior, const VectorXd& theta) {
+  const MatrixXd known = prior.rows();
+  MatrixXd rows(e.jacobian.rows() + known.rows(), theta.size());
+  rows << e.jacobian, known;
+  VectorXd residual(rows.rows());
+  residual << e.residual, known * (theta - prior.mean);
+  return {residual, rows};
 }
 
 }  // namespace
@@ -87,36 +96,45 @@ Prior prior_of(const AeroelasticModel& model, const FittedRig& fit, const Vector
   return prior;
 }
 
-VectorXd minimise(const RunResidual& residual, const Prior& prior, VectorXd theta) {
+VectorXd gauss_newton_step(const RunResidual::Evaluation& e, const Prior& prior, const VectorXd& theta) {
+  const auto [residual, rows] = linear_model(e, prior, theta);
+  MatrixXd scaled = rows(Eigen::all, prior.free);
+  const VectorXd scale = scaled.colwise().norm().transpose().cwiseMax(1e-300).cwiseInverse();
+  scaled = scaled * scale.asDiagonal();
+  VectorXd step = VectorXd::Zero(theta.size());
+  step(prior.free) = scale.cwiseProduct(scaled.colPivHouseholderQr().solve(-residual));
+  return step;
+}
+
+Search minimise(const RunResidual& residual, Prior prior, const VectorXd& theta, double enough, bool learn) {
   constexpr int most_steps = 12, most_halvings = 8;
-  constexpr double enough = 1e-3;  // of a chi-square whose own scatter is some tens
-  const MatrixXd known = prior.rows();
-  double now = cost(residual, prior, theta);
-  for (int iteration = 0; iteration < most_steps; ++iteration) {
-    const RunResidual::Evaluation e = residual.evaluate(theta, Partials::all);
-    MatrixXd rows(e.jacobian.rows() + known.rows(), theta.size());
-    rows << e.jacobian, known;
-    VectorXd right(rows.rows());
-    right << -e.residual, -(known * (theta - prior.mean));
-    MatrixXd scaled = rows(Eigen::all, prior.free);
-    const VectorXd scale = scaled.colwise().norm().transpose().cwiseMax(1e-300).cwiseInverse();
-    scaled = scaled * scale.asDiagonal();
-    const VectorXd move = scale.cwiseProduct(scaled.colPivHouseholderQr().solve(right));
-    double fraction = 1, then = now;
-    VectorXd next = theta;
-    for (int halving = 0; halving < most_halvings; ++halving, fraction /= 2) {
-      next = theta;
-      next(prior.free) += fraction * move;
-      then = cost(residual, prior, next);
-      if (then < now) break;
+  constexpr double settled = 0.02;  // of the logarithm of tau
+  Search search{std::move(prior), residual.solve(theta), {}, 0};
+  for (int step = 0; step < most_steps; ++step) {
+    const VectorXd& at = search.solution.theta;
+    search.evaluation = residual.differentiate(search.solution);
+    double change = 0;
+    if (learn) {
+      const Evidence best = evidence(search.evaluation, search.prior, at);
+      change = std::abs(std::log(best.amplitude / search.prior.amplitude));
+      search.prior.amplitude = best.amplitude;
+      search.determined = best.determined;
     }
-    if (!(then < now)) break;
-    const double gain = now - then;
-    theta = next;
-    now = then;
-    if (gain < enough) break;
+    const double now = cost(search.solution.chi2, search.prior, at);
+    const VectorXd move = gauss_newton_step(search.evaluation, search.prior, at);
+    const auto [left, rows] = linear_model(search.evaluation, search.prior, at);
+    const double promised = left.squaredNorm() - (left + rows * move).squaredNorm();
+    if ((promised < enough && change < settled) || step == most_steps - 1) break;
+    bool moved = false;
+    double fraction = 1;
+    for (int halving = 0; halving < most_halvings && !moved; ++halving, fraction /= 2) {
+      RunResidual::Solution next = residual.solve(at + fraction * move);
+      moved = cost(next.chi2, search.prior, next.theta) < now;
+      if (moved) search.solution = std::move(next);
+    }
+    if (!moved) break;
   }
-  return theta;
+  return search;
 }
 
 Evidence evidence(const RunResidual::Evaluation& e, const Prior& prior, const VectorXd& theta) {

@@ -29,9 +29,6 @@ struct Prior {
 
 Prior prior_of(const AeroelasticModel& model, const FittedRig& fit, const Eigen::VectorXd& theta, const std::string& run_file);
 
-/// Gauss-Newton with halved steps over the free parameters, from theta.
-Eigen::VectorXd minimise(const RunResidual& residual, const Prior& prior, Eigen::VectorXd theta);
-
 /// The amplitudes' standard deviation tau that maximises the evidence, the probability of the data with the unknowns integrated out, with the model linearised
 /// at `e` (MacKay, Neural Computation 4 (1992) 415): tau^2 = sum A_k^2 / gamma, gamma the number of amplitudes that the data determine.
 /// Within 0.01 and 10.
@@ -40,5 +37,20 @@ struct Evidence {
   double determined = 0;  ///< gamma
 };
 Evidence evidence(const RunResidual::Evaluation& e, const Prior& prior, const Eigen::VectorXd& theta);
+
+/// The step to the least of chi-square and prior of the model linearised at `e`, over the free parameters; zero for the others.
+Eigen::VectorXd gauss_newton_step(const RunResidual::Evaluation& e, const Prior& prior, const Eigen::VectorXd& theta);
+
+/// A search for the best theta, and the prior that it was found with.
+struct Search {
+  Prior prior;
+  RunResidual::Solution solution;
+  RunResidual::Evaluation evaluation;  ///< there
+  double determined = 0;               ///< amplitudes, by the data
+};
+
+/// Gauss-Newton with halved steps over the free parameters until the linear model promises less than `enough` of chi-square. `learn`: the weight of the
+/// regularisation follows the evidence at every step.
+Search minimise(const RunResidual& residual, Prior prior, const Eigen::VectorXd& theta, double enough, bool learn);
 
 }  // namespace unrig

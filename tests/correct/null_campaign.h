@@ -1,0 +1,27 @@
+#pragma once
+#include <string>
+
+#include "correct/correct.h"
+#include "fit/fit.h"
+#include "tests/support/sample_data.h"
+#include "tests/support/temporary_directory.h"
+
+namespace unrig::test {
+
+inline Rig null_rig() { return read_rig(null_campaign("rig.toml")); }
+
+/// What `unrig fit` finds in the five runs, read back from its file; once per process.
+inline const FittedRig& null_fit() {
+  static const FittedRig fitted = [] {
+    FitProblem problem;
+    problem.rig = null_rig();
+    for (const std::string run : {"dry_pluck", "wet_pluck", "step_a", "step_b", "step_c"}) problem.runs.push_back(read_run(null_campaign(run + ".csv")));
+    const TemporaryDirectory directory;
+    return read_fit(directory.file("fit.json", to_json(fit(problem))));
+  }();
+  return fitted;
+}
+
+inline CorrectProblem null_problem(const std::string& run) { return {null_rig(), null_fit(), read_run(null_campaign(run + ".csv")), 0}; }
+
+}  // namespace unrig::test
