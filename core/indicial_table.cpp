@@ -16,10 +16,10 @@ using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
 VectorXd spread_rates(double semichords) {
-  constexpr double fastest = 6, factor = 2.5;
+  constexpr double fastest = 6, factor = 1.7;
   const double slowest = 1 / semichords;
   const auto count = static_cast<Index>(std::round(std::log(fastest / slowest) / std::log(factor))) + 1;
-  VectorXd rates(std::clamp<Index>(count, 3, 12));
+  VectorXd rates(std::clamp<Index>(count, 3, 16));
   for (Index k = 0; k < rates.size(); ++k) rates[k] = slowest * std::pow(fastest / slowest, static_cast<double>(k) / static_cast<double>(rates.size() - 1));
   return rates;
 }

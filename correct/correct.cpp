@@ -47,6 +47,17 @@ AeroelasticModel free_model(const CorrectProblem& problem, double semichords) {
   return model;
 }
 
+/// The windows of the fit, and 40 knots more: a drive that still rings below the noise of the angle is load.
+std::vector<MotionBasis::Window> generous_windows(const Run& run) {
+  constexpr Index more = 40;
+  std::vector<MotionBasis::Window> windows = motion_windows(run);
+  for (std::size_t w = 0; w < windows.size(); ++w) {
+    const Index end = w + 1 < windows.size() ? windows[w + 1].knots.first - 4 * windows[w].stride - 1 : run.samples() - 5;
+    windows[w].knots.last = std::max(windows[w].knots.last, std::min(end, windows[w].knots.last + more * windows[w].stride));
+  }
+  return windows;
+}
+
 /// The best theta with noise levels, roughness of the motion and weight of the regularisation learned on the way.
 Search estimate(RunResidual& residual, const Prior& prior, const VectorXd& start, MatrixXd& rough) {
   constexpr double roughly = 1, well = 1e-3;  // of a chi-square whose own scatter is some tens
@@ -162,7 +173,7 @@ CorrectResult correct(const CorrectProblem& problem) {
   CorrectResult result;
   describe_run(problem, result);
 
-  const std::vector<MotionBasis::Window> windows = motion_windows(run);
+  const std::vector<MotionBasis::Window> windows = generous_windows(run);
   if (windows.empty()) throw NoAnswer(fmt::format("{}: the angle does not move by more than its noise; nothing can be said about how circulation builds up", run.file));
   const VectorXd& alpha = run.channel("alpha").value;
   const auto onset = static_cast<double>(moving(alpha, noise_level(alpha)).front().first);

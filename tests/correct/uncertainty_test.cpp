@@ -55,7 +55,7 @@ TEST(Uncertainty, CalibrationErrorMovesTheLoadAsStated) {
 
 TEST(Uncertainty, WeightOfTheRegularisationHardlyMatters) {
   const CorrectResult result = correct(test::null_problem("step_a"));
-  EXPECT_GT(result.determined, 5);  // of 7 amplitudes
+  EXPECT_GT(result.determined, 5);  // of 11 amplitudes
   const VectorXd half = (result.indicial.half_weight - result.indicial.value).cwiseAbs(), twice = (result.indicial.twice_weight - result.indicial.value).cwiseAbs();
   EXPECT_GT(twice.maxCoeff(), 0) << "it is there";
   // Its bias, averaged over what the prior holds possible, is in the band; a factor of two moves the answer by no more than twice that.

@@ -73,7 +73,7 @@ std::vector<Shaft> shafts() {
            [](double t) { return t < 1 || t > 3.5 ? 0.0 : degrees(1) * smooth((t - 1) / 0.1) * smooth((3.5 - t) / 0.1) * (1 - std::cos(2 * std::numbers::pi * 2 * (t - 1))); }, 10}};
 }
 
-constexpr double gauge_noise = 0.027, calibration_error = 0.0005, dt = 0.002;  // the calibration so good that it does not hide the rest
+constexpr double gauge_noise = 0.027, calibration_error = 0.0001, dt = 0.002;  // the calibration so good that it does not hide the rest
 constexpr Index samples = 3000, finer = 4;
 const double angle_noise = degrees(0.01);
 
