@@ -27,6 +27,26 @@ VectorXd smoothed_power(const VectorXcd& lines, double samples, Index half) {
   return smooth;
 }
 
+/// Power of an autoregression fitted to the residual (Burg's recursion; order by Akaike's criterion), on the lines of its transform; scaled as smoothed_power is.
+/// It is smooth: it does not see that the fit took the noise out of the few lines that tell it the parameters.
+VectorXd autoregressive_power(const VectorXd& residual, double counted, Index lines) {
+  const Index n = residual.size(), most = std::min<Index>(30, n / 20);
+  VectorXd forward = residual, backward = residual, a = VectorXd::Zero(most + 1), best = VectorXd::Unit(most + 1, 0);
+  a[0] = 1;
+  double error = residual.squaredNorm() / counted, best_error = error, least = counted * std::log(error);
+  for (Index order = 1; order <= most; ++order) {
+    const auto f = forward.segment(order, n - order), b = backward.segment(order - 1, n - order);
+    const double reflection = -2 * f.dot(b) / (f.squaredNorm() + b.squaredNorm());
+    const VectorXd next = f + reflection * b, last = b + reflection * f, before = a;
+    forward.segment(order, n - order) = next;
+    backward.segment(order, n - order) = last;
+    for (Index i = 1; i <= order; ++i) a[i] = before[i] + reflection * before[order - i];
+    error *= 1 - reflection * reflection;
+    if (const double criterion = counted * std::log(error) + 2 * static_cast<double>(order); criterion < least) least = criterion, best = a, best_error = error;
+  }
+  return best_error * fourier(best, n).head(lines).cwiseAbs2().cwiseInverse();
+}
+
 /// Kolmogorov's distribution: P(sqrt(m) D > x).
 double kolmogorov(double x) {
   if (x < 0.2) return 1;
@@ -45,7 +65,8 @@ MatrixXd coloured_information(const RunResidual::Sensitivity& sensitivity) {
     if (information.size() == 0) information = MatrixXd::Zero(parameters, parameters);
     const auto counted = static_cast<double>((channel.residual.array() != 0).count());
     if (counted == 0) continue;
-    const VectorXd power = smoothed_power(fourier(channel.residual), counted, half);
+    VectorXd power = smoothed_power(fourier(channel.residual), counted, half);
+    power = power.cwiseMax(autoregressive_power(channel.residual, counted, power.size()));
     std::vector<Index> active;
     std::vector<VectorXcd> lines;
     for (Index j = 0; j < parameters; ++j) {
@@ -63,6 +84,15 @@ MatrixXd coloured_information(const RunResidual::Sensitivity& sensitivity) {
       }
   }
   return information;
+}
+
+double power_at_zero(const VectorXd& residual) {
+  const auto counted = static_cast<double>((residual.array() != 0).count());
+  const VectorXcd lines = fourier(residual);
+  constexpr Index low = 7;
+  const Index used = std::min(low, lines.size() - 1);
+  if (counted == 0 || used < 1) return 1;
+  return std::max(lines.segment(1, used).squaredNorm() / (static_cast<double>(used) * counted), autoregressive_power(residual, counted, 1)[0]);
 }
 
 double whiteness(const RunResidual::Sensitivity& sensitivity) {

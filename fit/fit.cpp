@@ -9,8 +9,10 @@
 
 #include "core/effects/effect.h"
 #include "fit/first_guess.h"
+#include "fit/fit_description.h"
 #include "fit/joint_problem.h"
 #include "fit/uncertainty.h"
+#include "fit/undetermined.h"
 
 namespace unrig {
 namespace {
@@ -36,32 +38,6 @@ void carry_over(const JointProblem& last, JointProblem& next) {
     next.unknowns()[i].value = last.unknowns()[i].value;
     next.unknowns()[i].held = last.unknowns()[i].held;
     next.unknowns()[i].why_held = last.unknowns()[i].why_held;
-  }
-}
-
-/// Unknowns that no run responds to, or only through a combination of others, are held where they are. Of a degenerate set the masses go first:
-/// a free decay fixes stiffness and damping per mass, and the mass of a structure is what is best known from drawings.
-void hold_undetermined(JointProblem& joint) {
-  const MatrixXd jacobian = joint.linearise().jacobian;
-  std::vector<Index> order(joint.unknowns().size());
-  for (std::size_t i = 0; i < order.size(); ++i) order[i] = static_cast<Index>(i);
-  const auto last_resort = [&](Index i) {
-    const std::string& name = joint.parameter(joint.unknowns()[static_cast<std::size_t>(i)]).name;
-    return name.ends_with(".mass") ? 1 : 0;
-  };
-  std::stable_sort(order.begin(), order.end(), [&](Index a, Index b) { return last_resort(a) < last_resort(b); });
-
-  constexpr double dependent = 1e-6;  // sine of the angle to the span of the others; exact derivatives leave 1e-10 where it is truly zero
-  std::vector<VectorXd> span;
-  for (Index i : order) {
-    VectorXd rest = jacobian.col(i);
-    const double length = rest.norm();
-    for (int pass = 0; pass < 2; ++pass)
-      for (const VectorXd& direction : span) rest -= direction.dot(rest) * direction;
-    Unknown& unknown = joint.unknowns()[static_cast<std::size_t>(i)];
-    unknown.held = !(length > 0) || rest.norm() < dependent * length;
-    if (unknown.held) unknown.why_held = length > 0 ? "These runs determine it only together with others" : "These runs do not respond to it";
-    if (!unknown.held) span.push_back(rest.normalized());
   }
 }
 
@@ -191,25 +167,6 @@ void refine_motion(JointProblem& joint, const FitProblem& problem, Windows& wind
   }
 }
 
-/// A standard error as large as this says nothing that was not known before: half of itself, for a damping ratio 0.2.
-double ignorance(const Parameter& p, double value) {
-  return p.name.ends_with("damping_ratio") ? 0.2 : 0.5 * std::max(std::abs(p.start), std::abs(value));
-}
-
-/// Unknowns that the data hardly touch go back to the rig file's value and are held there, so that they cannot bend the others.
-bool hold_weak(JointProblem& joint, const Uncertainty& uncertainty) {
-  bool held = false;
-  for (std::size_t a = 0; a < uncertainty.free.size(); ++a) {
-    Unknown& u = joint.unknowns()[static_cast<std::size_t>(uncertainty.free[a])];
-    const double error = std::sqrt(uncertainty.covariance()(static_cast<Index>(a), static_cast<Index>(a)));
-    if (error < ignorance(joint.parameter(u), u.value)) continue;
-    u.value = joint.parameter(u).start;
-    u.held = held = true;
-    u.why_held = fmt::format("These runs hardly respond to it (one standard deviation would be {:.2g})", error);
-  }
-  return held;
-}
-
 /// Noise, motion, and what the data cannot determine: each looked at again once the model fits.
 Uncertainty settle(JointProblem& joint, const FitProblem& problem, Windows& windows, FitResult& result) {
   for (RunResidual& run : joint.runs()) {
@@ -217,124 +174,27 @@ Uncertainty settle(JointProblem& joint, const FitProblem& problem, Windows& wind
     run.settle_noise(joint.theta(r));
   }
   refine_motion(joint, problem, windows, result);
-  const Uncertainty uncertainty = estimate_uncertainty(joint);
-  if (!hold_weak(joint, uncertainty)) return uncertainty;
-  solve(joint, result);
-  return estimate_uncertainty(joint);
+  Uncertainty uncertainty = estimate_uncertainty(joint);
+  constexpr int rounds = 3;  // what was a line of the noise may turn out to be nothing at all once its damping is held
+  for (int round = 0; round < rounds && hold_weak(joint, uncertainty, problem.start); ++round) {
+    solve(joint, result);
+    uncertainty = estimate_uncertainty(joint);
+  }
+  return uncertainty;
 }
 
-double rms(const VectorXd& x, const VectorXd& weight) {
-  double sum = 0;
-  Index count = 0;
-  for (Index k = 0; k < x.size(); ++k)
-    if (weight[k] > 0) sum += x[k] * x[k], ++count;
-  return count > 0 ? std::sqrt(sum / static_cast<double>(count)) : 0;
-}
-
-FittedRun describe_run(const RunResidual& residual, const VectorXd& theta, double chi2) {
-  const Run& run = residual.run();
-  const RunResidual::Prediction p = residual.predict(theta);
-  FittedRun fitted;
-  fitted.file = run.file;
-  fitted.samples = run.samples();
-  fitted.chi2 = chi2;
-  fitted.degrees_of_freedom = residual.degrees_of_freedom();
-  const auto add = [&](const std::string& name, const VectorXd& model, const VectorXd& weight, double noise) {
-    const Channel& channel = run.channel(name);
-    FittedChannel c;
-    c.name = name;
-    c.unit = channel.unit;
-    c.missing = channel.missing;
-    c.samples = (weight.array() > 0).count();
-    c.rms_residual = rms(channel.value - model, weight);
-    c.noise = noise;
-    fitted.channels.push_back(c);
+/// A name that no parameter has must not pass in silence.
+void check_names(const AeroelasticModel& model, const FitProblem& problem) {
+  std::string names;
+  for (const Parameter& p : model.parameters()) names += (names.empty() ? "" : ", ") + p.name;
+  const auto known = [&](const std::string& wanted) {
+    return std::any_of(model.parameters().begin(), model.parameters().end(), [&](const Parameter& p) { return wanted == p.name || (p.per_run && wanted.starts_with(p.name + " (")); });
   };
-  for (std::size_t c = 0; c < p.channels.size(); ++c)
-    add(p.channels[c], p.output.col(static_cast<Index>(c)), residual.channel_weight(c), residual.sigma(c));
-  if (p.motion.angle.size() > 0) {
-    add("alpha", p.motion.angle.array() + p.angle_offset[0], residual.angle_weight(), residual.angle_sigma());
-    fitted.channels.back().spikes = residual.spikes();
-  }
-  return fitted;
+  for (const auto& [name, value] : problem.start)
+    if (!known(name)) throw InputError({"--start", 0}, "no parameter '" + name + "'", "wanted one of " + names, "");
+  for (const std::string& name : problem.profile)
+    if (name != "all" && !known(name)) throw InputError({"--profile", 0}, "no parameter '" + name + "' can be profiled", "wanted one of " + names, "Run files go before the option, or behind another one.");
 }
-
-/// Steady load before the motion as a coefficient: the constant part of the gauge over what a unit coefficient on all strips would read.
-/// The gauge's own zero cannot be told from it.
-void add_steady_load(const RunResidual& residual, const VectorXd& theta, FitResult& result) {
-  const Rig& rig = residual.model().rig();
-  const Conditions& c = residual.conditions();
-  if (rig.is_modal() || rig.gauge_element == 0 || c.speed == 0 || residual.channels().front() != "gauge") return;
-  const double gauge = rig.station[rig.gauge_element - 1], lever = rig.station[rig.calibration_element - 1] - gauge;
-  double unit_reading = 0;
-  for (int element : rig.submerged)
-    unit_reading += c.density * c.speed * c.speed * rig.semichord() * rig.strip_length * std::max(0.0, rig.station[element - 1] - gauge) / lever;
-  const RunResidual::Prediction p = residual.predict(theta);
-  FittedParameter steady;
-  steady.name = "steady_normal_force";
-  steady.unit = "1";
-  steady.run = residual.run().file;
-  steady.value = p.offset[0] / unit_reading;
-  const Index column = residual.first_offset();
-  const VectorXd unit = VectorXd::Unit(p.linear.size(), column);
-  const VectorXd half = p.linear_factor.triangularView<Eigen::Upper>().transpose().solve(unit);
-  steady.std_error = half.norm() / unit_reading;
-  steady.start = 0;
-  result.parameters.push_back(steady);
-}
-
-std::string what_to_record(const std::string& name) {
-  if (name == "apparent_mass_coefficient") return "Record a free decay in the fluid besides one in air.";
-  if (name == "normal_force_slope") return "Record a step of the angle at this speed.";
-  if (name == "torsion.stiffness_scale" || name == "torsion.damping_ratio") return "Record a run that excites torsion: a rapid step, or a pluck off the pitch axis.";
-  if (name.ends_with(".mass")) return "Record a run with a measured force: a free decay fixes stiffness and damping only per mass.";
-  if (name.ends_with(".mount_participation")) return "Record a run with the mount moving.";
-  return "Record a free decay.";
-}
-
-/// Standard errors and correlations of all unknowns that were not held.
-void describe_parameters(const JointProblem& joint, const Uncertainty& uncertainty, FitResult& result) {
-  const MatrixXd& covariance = uncertainty.covariance();
-  result.coloured = uncertainty.coloured;
-  for (std::size_t r = 0; r < joint.runs().size(); ++r) result.runs[r].whiteness = uncertainty.whiteness[r];
-  const auto all = static_cast<Index>(joint.unknowns().size()), count = static_cast<Index>(uncertainty.free.size());
-  result.correlation = MatrixXd::Identity(all, all);
-  for (Index a = 0; a < count; ++a)
-    for (Index b = 0; b < count; ++b)
-      result.correlation(uncertainty.free[static_cast<std::size_t>(a)], uncertainty.free[static_cast<std::size_t>(b)]) =
-          covariance(a, b) / std::sqrt(covariance(a, a) * covariance(b, b));
-
-  for (Index i = 0; i < all; ++i) {
-    const Unknown& u = joint.unknowns()[static_cast<std::size_t>(i)];
-    const Parameter& p = joint.parameter(u);
-    FittedParameter fitted;
-    fitted.name = p.name;
-    fitted.unit = p.unit;
-    fitted.run = u.run >= 0 ? joint.runs()[static_cast<std::size_t>(u.run)].run().file : "";
-    fitted.value = u.value;
-    fitted.start = p.start;
-    fitted.std_error = std::nan("");
-    const auto position = std::find(uncertainty.free.begin(), uncertainty.free.end(), i);
-    if (position == uncertainty.free.end()) {
-      fitted.identified = false;
-      fitted.advice = u.why_held + "; held at the rig file's value. " + what_to_record(p.name);
-    } else {
-      const Index a = position - uncertainty.free.begin();
-      fitted.std_error = std::sqrt(covariance(a, a));
-      fitted.std_error_white = std::sqrt(uncertainty.white_covariance(a, a));
-      fitted.std_error_coloured = std::sqrt(uncertainty.coloured_covariance(a, a));
-      if (u.value <= p.lower || u.value >= p.upper) {
-        fitted.identified = false;
-        fitted.advice = fmt::format("It ended at its bound {}. ", u.value) + what_to_record(p.name);
-      }
-    }
-    result.parameters.push_back(fitted);
-  }
-}
-
-}  // namespace
-
-namespace {
 
 /// The fit goes on with effects at work: from the best of each effect's starts, everything else where the fit without it ended.
 JointProblem with_effects(const AeroelasticModel& model, const JointProblem& joint, const FitProblem& problem, const Windows& windows, FitResult& result) {
@@ -409,9 +269,10 @@ FitResult fit(const FitProblem& problem) {
     windows.push_back(problem.rig.is_modal() ? std::vector<MotionBasis::Window>{} : motion_windows(run));
     for (const std::string& warning : run.warnings) result.warnings.push_back(warning);
   }
+  const AeroelasticModel complete = problem.effects.empty() ? model : model.with_effects(problem.effects);
+  check_names(complete, problem);
   JointProblem joint = arrive(model, problem, problem.start, windows, result);
   hold_undetermined(joint);
-  const AeroelasticModel complete = problem.effects.empty() ? model : model.with_effects(problem.effects);
   if (!problem.effects.empty()) joint = with_effects(complete, joint, problem, windows, result);
   result.effects = problem.effects;
   const Uncertainty uncertainty = settle(joint, problem, windows, result);
@@ -424,12 +285,9 @@ FitResult fit(const FitProblem& problem) {
     result.variables += joint.runs()[r].linear_unknowns();
     result.runs.push_back(describe_run(joint.runs()[r], joint.theta(r), lin.run_chi2[r]));
   }
-  describe_parameters(joint, uncertainty, result);
-  for (std::size_t r = 0; r < joint.runs().size(); ++r) add_steady_load(joint.runs()[r], joint.theta(r), result);
-  const auto all = static_cast<Index>(result.parameters.size()), known = result.correlation.rows();
-  result.correlation.conservativeResizeLike(MatrixXd::Identity(all, all));
-  result.correlation.block(0, known, known, all - known).setZero();
-  result.correlation.block(known, 0, all - known, known).setZero();
+  describe_parameters(joint, uncertainty, problem.start, result);
+  describe_profiles(joint, uncertainty, problem, result);
+  warn_of_mismatch(result);
   result.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
   return result;
 }

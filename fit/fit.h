@@ -1,7 +1,6 @@
 #pragma once
 #include <Eigen/Core>
 #include <functional>
-#include <map>
 #include <string>
 #include <vector>
 
@@ -9,6 +8,8 @@
 #include "core/rig.h"
 #include "core/run.h"
 #include "core/wagner.h"
+#include "fit/profile.h"
+#include "fit/undetermined.h"
 
 namespace unrig {
 
@@ -19,7 +20,8 @@ struct FitProblem {
   std::vector<Run> runs;
   Wagner circulation = Wagner::within_1e4;
   std::vector<std::string> effects;     ///< ids of core/effects/table.cpp that are at work
-  std::map<std::string, double> start;  ///< start values other than the rig file's, by parameter name
+  StartValues start;                    ///< start values other than the rig file's, by parameter name
+  std::vector<std::string> profile;     ///< parameters to give profile-likelihood intervals of, or "all"
   std::function<void(const std::string&)> progress;  ///< told what is being done; empty: silent
 };
 
@@ -56,6 +58,11 @@ struct FittedRun {
   double reduced_chi2() const { return chi2 / static_cast<double>(degrees_of_freedom); }
 };
 
+struct ProfiledParameter {
+  std::string name, run, unit;
+  std::vector<ProfileInterval> intervals;  ///< 68 % (one standard deviation) and 95 %
+};
+
 struct FitResult {
   bool converged = false;
   std::string message;
@@ -66,6 +73,8 @@ struct FitResult {
   double seconds = 0;
   std::vector<FittedParameter> parameters;
   Eigen::MatrixXd correlation;  ///< of `parameters`; zero beside the diagonal for those that were held
+  std::vector<DeterminedCombination> determined;  ///< where a parameter is not; their unknowns are the first of `parameters`
+  std::vector<ProfiledParameter> profiles;
   std::vector<FittedRun> runs;
   bool coloured = false;        ///< which of the two standard errors `std_error` is
   std::vector<std::string> effects;
@@ -86,8 +95,9 @@ struct FitResult {
 ///
 /// Standard errors: where the residual of a run is white (1 % test of its cumulative periodogram), the inverse Gauss-Newton Hessian, times the reduced
 /// chi-square where that exceeds one; where any is coloured, the covariance that follows from the residuals' own spectra (fit/coloured_noise.h).
-/// Both are in the result.
-/// Throws InputError where a run does not belong to the rig.
+/// Both are in the result. What the runs do not determine is held; the standard errors of the others allow for as much as it may be off
+/// (fit/undetermined.h), and where that leaves nothing known of one it is not identified either: `determined` then has the combination that is.
+/// Throws InputError where a run does not belong to the rig, or a name to no parameter.
 FitResult fit(const FitProblem& problem);
 
 /// The model of a set of runs: one basis, rich enough for all of them.

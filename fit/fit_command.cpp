@@ -12,6 +12,7 @@
 namespace unrig {
 
 int fit_command(int argc, char** argv) {
+  FitProblem problem;
   CLI::App app{"Fits stiffness, damping and apparent mass of a rig to recordings, all together.", "unrig fit"};
   std::string rig_path, output, circulation = "1e-4";
   std::vector<std::string> run_paths, starts, effect_ids;
@@ -21,6 +22,7 @@ int fit_command(int argc, char** argv) {
   app.add_option("-o,--output", output, "result (JSON)")->required();
   app.add_option("--effect", effect_ids, "physics beyond the rig model that is at work (repeatable), e.g. gauge-lowpass");
   app.add_option("--start", starts, "start value of a parameter, NAME=VALUE (repeatable)");
+  CLI::Option* const profile = app.add_option("--profile", problem.profile, "profile-likelihood intervals (68 %, 95 %) of these parameters; without a name, of all that were fitted")->expected(0, -1);
   app.add_option("--wagner", circulation, "circulatory build-up: 1e-4, 1e-6 (largest error), jones, seed")->capture_default_str();
   app.add_option("--correlations", least, "smallest correlation to report")->capture_default_str();
   app.footer("Example:\n  unrig fit --rig rig.toml dry_pluck.csv wet_pluck.csv step_a.csv -o fit.json");
@@ -30,7 +32,7 @@ int fit_command(int argc, char** argv) {
     return app.exit(e) == 0 ? exit_done : exit_wrong_use;
   }
 
-  FitProblem problem;
+  if (profile->count() > 0 && problem.profile.empty()) problem.profile = {"all"};
   problem.rig = read_rig(rig_path);
   try {
     problem.circulation = wagner_from_name(circulation);

@@ -28,7 +28,8 @@ json number(double x) { return std::isfinite(x) ? json(x) : json(nullptr); }
 
 std::string base_name(const std::string& path) { return std::filesystem::path(path).filename().string(); }
 
-std::string label(const FittedParameter& p) { return p.run.empty() ? p.name : p.name + " (" + base_name(p.run) + ")"; }
+template <class Named>
+std::string label(const Named& p) { return p.run.empty() ? p.name : p.name + " (" + base_name(p.run) + ")"; }
 
 }  // namespace
 
@@ -59,6 +60,17 @@ std::string to_json(const FitResult& r) {
     if (!p.run.empty()) item["run"] = p.run;
     if (!p.advice.empty()) item["advice"] = p.advice;
     out["parameters"].push_back(item);
+  }
+  if (!r.determined.empty()) out["determined"] = json::array();
+  for (const DeterminedCombination& c : r.determined)
+    out["determined"].push_back({{"combination", c.combination}, {"value", number(c.value)}, {"std_error", number(c.std_error)}, {"settled_by", c.settled_by}});
+  if (!r.profiles.empty()) out["profile"] = json::array();
+  for (const ProfiledParameter& p : r.profiles) {
+    json item = {{"name", p.name}, {"unit", p.unit}, {"intervals", json::array()}};
+    if (!p.run.empty()) item["run"] = p.run;
+    for (const ProfileInterval& i : p.intervals)
+      item["intervals"].push_back({{"confidence", i.confidence}, {"lower", number(i.lower.value)}, {"upper", number(i.upper.value)}, {"text", i.text}});
+    out["profile"].push_back(item);
   }
   out["correlation"] = json::array();
   for (Eigen::Index i = 0; i < r.correlation.rows(); ++i) {
@@ -182,6 +194,12 @@ std::string report(const FitResult& r, double least) {
       text += fmt::format("    {:<{}} {: .7g}{} (fixed)\n", label(p) + ":", width + 1, p.value, unit);
     if (!p.advice.empty()) text += fmt::format("    {:<{}}  {}\n", "", width + 1, p.advice);
   }
+
+  if (!r.determined.empty()) text += "[[Determined]]\n";
+  for (const DeterminedCombination& c : r.determined) text += fmt::format("    {} = {:.7g} +/- {:.3g}. {}\n", c.combination, c.value, c.std_error, c.settled_by);
+  if (!r.profiles.empty()) text += "[[Profile likelihood]]\n";
+  for (const ProfiledParameter& p : r.profiles)
+    for (const ProfileInterval& i : p.intervals) text += fmt::format("    {:<{}} {}\n", &i == &p.intervals.front() ? label(p) + ":" : "", width + 1, i.text);
 
   std::vector<std::tuple<double, std::string>> pairs;
   for (Eigen::Index i = 0; i < r.correlation.rows(); ++i)

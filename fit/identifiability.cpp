@@ -73,30 +73,8 @@ std::string power(const std::string& name, double exponent) { return exponent ==
 
 bool simple(double exponent) { return std::abs(2 * exponent - std::round(2 * exponent)) < 2e-3 && std::abs(exponent) < 4; }
 
-/// One unknown with the pivots that can change it: the combination that the data do determine.
-struct Tie {
-  std::string name;
-  std::vector<std::string> pivots;
-  std::vector<double> relative;  ///< d ln x / d ln pivot along the undetermined direction; NaN where one of them is zero
-  std::vector<double> absolute;  ///< d x / d pivot
-
-  std::string determined() const {
-    if (std::all_of(relative.begin(), relative.end(), [](double e) { return !std::isnan(e) && simple(e); })) {
-      std::string above = name, below;
-      for (std::size_t k = 0; k < pivots.size(); ++k) {
-        const double exponent = -std::round(2 * relative[k]) / 2;
-        (exponent > 0 ? above : below) += (exponent > 0 || !below.empty() ? " " : "") + power(pivots[k], std::abs(exponent));
-      }
-      return below.empty() ? above : above + " / " + (below.find(' ') == std::string::npos ? below : "(" + below + ")");
-    }
-    std::string sum = name;
-    for (std::size_t k = 0; k < pivots.size(); ++k) {
-      const double factor = std::abs(absolute[k]);
-      sum += (absolute[k] > 0 ? " - " : " + ") + (std::abs(factor - 1) < 1e-3 ? pivots[k] : fmt::format("{:.4g} {}", factor, pivots[k]));
-    }
-    return sum;
-  }
-};
+/// -relative, to the half that it is.
+double exponent_of(const Tie& tie, std::size_t k) { return -std::round(2 * tie.relative(k)) / 2; }
 
 /// Names what the null space of the free unknowns leaves open.
 void name_undetermined(const LeastSquaresProblem& problem, const LeastSquaresPoint& point, const Indices& free, const Decomposition& d,
@@ -141,15 +119,13 @@ void name_undetermined(const LeastSquaresProblem& problem, const LeastSquaresPoi
   // What is determined: every follower less what its pivots give it.
   for (Index a = 0; a < count; ++a) {
     if (is_pivot(a)) continue;
-    Tie tie{unknown(a).name, {}, {}, {}};
+    Tie tie{unknown(a).name, unknown(a).value, {}, {}, {}};
     Indices tied;
     for (Index k = 0; k < open; ++k) {
       const Index p = pivots[static_cast<std::size_t>(k)];
       if (std::abs(follow(a, k)) < takes_part) continue;
       tied.push_back(p);
-      tie.pivots.push_back(unknown(p).name);
-      tie.absolute.push_back(follow(a, k) * d.length[p] / d.length[a]);
-      tie.relative.push_back(unknown(a).value != 0 && unknown(p).value != 0 ? tie.absolute.back() * unknown(p).value / unknown(a).value : nan);
+      tie.add(unknown(p).name, unknown(p).value, follow(a, k) * d.length[p] / d.length[a]);
     }
     if (tied.empty()) continue;
     tied.push_back(a);
@@ -180,6 +156,46 @@ double one_sided_error(const LeastSquaresPoint& point, const Indices& free, Inde
 }
 
 }  // namespace
+
+void Tie::add(const std::string& pivot, double pivot_value, double slope_with_it) {
+  pivots.push_back(pivot);
+  pivot_values.push_back(pivot_value);
+  slope.push_back(slope_with_it);
+}
+
+double Tie::relative(std::size_t k) const { return own != 0 && pivot_values[k] != 0 ? slope[k] * pivot_values[k] / own : nan; }
+
+bool Tie::is_product() const {
+  for (std::size_t k = 0; k < pivots.size(); ++k)
+    if (const double exponent = relative(k); std::isnan(exponent) || !simple(exponent) || exponent_of(*this, k) == 0) return false;
+  return true;
+}
+
+std::string Tie::determined() const {
+  if (is_product()) {
+    std::string above = name, below;
+    for (std::size_t k = 0; k < pivots.size(); ++k) {
+      const double exponent = exponent_of(*this, k);
+      (exponent > 0 ? above : below) += (exponent > 0 || !below.empty() ? " " : "") + power(pivots[k], std::abs(exponent));
+    }
+    return below.empty() ? above : above + " / " + (below.find(' ') == std::string::npos ? below : "(" + below + ")");
+  }
+  std::string sum = name;
+  for (std::size_t k = 0; k < pivots.size(); ++k) {
+    const double factor = std::abs(slope[k]);
+    sum += (slope[k] > 0 ? " - " : " + ") + (std::abs(factor - 1) < 1e-3 ? pivots[k] : fmt::format("{:.6g} {}", factor, pivots[k]));
+  }
+  return sum;
+}
+
+double Tie::value() const {
+  double combination = own;
+  for (std::size_t k = 0; k < pivots.size(); ++k)
+    combination = is_product() ? combination * std::pow(pivot_values[k], exponent_of(*this, k)) : combination - slope[k] * pivot_values[k];
+  return combination;
+}
+
+double Tie::gain() const { return is_product() ? value() / own : 1; }
 
 std::string Covariance::text() const {
   std::string all;

@@ -29,6 +29,24 @@ struct UndeterminedDirection {
   std::string text;        ///< "m +1 % with k +1 %, c +1 %"
 };
 
+/// One unknown x and others p that can change together without any residual noticing: the combination that the data do determine.
+struct Tie {
+  std::string name;
+  double own = 0;                    ///< value of x
+  std::vector<std::string> pivots;
+  std::vector<double> pivot_values;
+  std::vector<double> slope;         ///< d x / d p along the undetermined direction
+
+  void add(const std::string& pivot, double value, double slope_with_it);
+  /// Whether it is x times simple powers of the pivots ("k / m"); else it is the sum x - slope p.
+  bool is_product() const;
+  std::string determined() const;
+  double value() const;
+  double gain() const;  ///< d combination / d x
+  /// d ln x / d ln p, NaN where one of them is zero.
+  double relative(std::size_t k) const;
+};
+
 struct CovarianceOptions {
   /// Least singular value, of the Jacobian with its columns scaled to unit length, that counts as a response. Derivatives that are exact to
   /// rounding leave 1e-15 where there is none; data that determine a direction at all leave 1e-9 (Bennett5 of NIST) or more.

@@ -1,0 +1,203 @@
+#include "fit/fit_description.h"
+
+#include <Eigen/LU>
+#include <algorithm>
+#include <cmath>
+
+#include <fmt/format.h>
+
+#include "core/simulate.h"
+#include "fit/coloured_noise.h"
+
+namespace unrig {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+namespace {
+
+double rms(const VectorXd& x, const VectorXd& weight) {
+  double sum = 0;
+  Index count = 0;
+  for (Index k = 0; k < x.size(); ++k)
+    if (weight[k] > 0) sum += x[k] * x[k], ++count;
+  return count > 0 ? std::sqrt(sum / static_cast<double>(count)) : 0;
+}
+
+/// Covariance of all unknowns (zero for those held) once what is held may be off by its ignorance. Unknowns that are lost with it are not identified:
+/// their covariance stays what it is with the others held.
+MatrixXd covariance_of_all(const JointProblem& joint, const Uncertainty& uncertainty, const HeldInfluence& influence, std::vector<bool>& identified) {
+  const auto all = static_cast<Index>(joint.unknowns().size());
+  MatrixXd covariance = MatrixXd::Zero(all, all), shift = influence.shift;
+  covariance(uncertainty.free, uncertainty.free) = uncertainty.covariance();
+  for (Index i : uncertainty.free) {
+    const Unknown& u = joint.unknowns()[static_cast<std::size_t>(i)];
+    constexpr double most_of_it = 0.45;  // one in proportion to a held one is off by half of itself
+    const double off = shift.row(i).norm();
+    if (off <= most_of_it * std::abs(u.value) && std::hypot(std::sqrt(covariance(i, i)), off) < ignorance(joint.parameter(u), u.value)) continue;
+    identified[static_cast<std::size_t>(i)] = false;
+    shift.row(i).setZero();
+  }
+  return covariance + shift * shift.transpose();
+}
+
+/// Steady load before the motion as a coefficient: the constant part of the gauge over what a unit coefficient on all strips would read. The
+/// gauge's own zero cannot be told from it. `covariance`: of all unknowns and of the steady loads so far; grows by this one.
+///
+/// The offset c of the gauge is a linear unknown that follows theta: var(c) = var(c at fixed theta) + (dc/dtheta) cov(theta) (dc/dtheta)^T. At fixed theta it is
+/// all but a mean of the residual, whose variance goes with the residual's spectrum at frequency zero.
+void add_steady_load(const JointProblem& joint, std::size_t run, bool coloured, MatrixXd& covariance, FitResult& result) {
+  const RunResidual& residual = joint.runs()[run];
+  const Rig& rig = residual.model().rig();
+  const Conditions& c = residual.conditions();
+  if (rig.is_modal() || rig.gauge_element == 0 || c.speed == 0 || residual.channels().front() != "gauge") return;
+  const double unit_reading = gauge_reading_of_unit_coefficient(rig, c.density, c.speed);
+  const VectorXd theta = joint.theta(run);
+  const RunResidual::Evaluation e = residual.evaluate(theta, Partials::all);
+  const Index column = residual.first_offset(), known = covariance.rows();
+  const VectorXd half = e.linear_factor.triangularView<Eigen::Upper>().transpose().solve(VectorXd::Unit(e.linear.size(), column));
+  const double factor = coloured ? power_at_zero(residual.sensitivity(theta).channels.front().residual) : std::max(1.0, result.runs[run].reduced_chi2());
+  VectorXd follows = VectorXd::Zero(known);
+  for (std::size_t i = 0; i < joint.unknowns().size(); ++i)
+    if (const Unknown& u = joint.unknowns()[i]; u.run < 0 || u.run == static_cast<int>(run)) follows[static_cast<Index>(i)] = e.linear_slope(column, u.parameter) / unit_reading;
+  const VectorXd shared = covariance * follows;
+  const double own = half.squaredNorm() / (unit_reading * unit_reading);
+  covariance.conservativeResize(known + 1, known + 1);
+  covariance.row(known).head(known) = shared.transpose();
+  covariance.col(known).head(known) = shared;
+  covariance(known, known) = factor * own + follows.dot(shared);
+
+  FittedParameter steady;
+  steady.name = "steady_normal_force";
+  steady.unit = "1";
+  steady.run = residual.run().file;
+  steady.value = e.linear[column] / unit_reading;
+  steady.std_error = std::sqrt(covariance(known, known));
+  steady.start = 0;
+  result.parameters.push_back(steady);
+}
+
+/// 1 on the diagonal, 0 beside what was held.
+MatrixXd correlation_of(const MatrixXd& covariance) {
+  const VectorXd inverse = covariance.diagonal().unaryExpr([](double v) { return v > 0 ? 1 / std::sqrt(v) : 0.0; });
+  MatrixXd correlation = inverse.asDiagonal() * covariance * inverse.asDiagonal();
+  correlation.diagonal().setOnes();
+  return correlation.cwiseMin(1).cwiseMax(-1);
+}
+
+}  // namespace
+
+FittedRun describe_run(const RunResidual& residual, const VectorXd& theta, double chi2) {
+  const Run& run = residual.run();
+  const RunResidual::Prediction p = residual.predict(theta);
+  FittedRun fitted;
+  fitted.file = run.file;
+  fitted.samples = run.samples();
+  fitted.chi2 = chi2;
+  fitted.degrees_of_freedom = residual.degrees_of_freedom();
+  const auto add = [&](const std::string& name, const VectorXd& model, const VectorXd& weight, double noise) {
+    const Channel& channel = run.channel(name);
+    FittedChannel c;
+    c.name = name;
+    c.unit = channel.unit;
+    c.missing = channel.missing;
+    c.samples = (weight.array() > 0).count();
+    c.rms_residual = rms(channel.value - model, weight);
+    c.noise = noise;
+    fitted.channels.push_back(c);
+  };
+  for (std::size_t c = 0; c < p.channels.size(); ++c)
+    add(p.channels[c], p.output.col(static_cast<Index>(c)), residual.channel_weight(c), residual.sigma(c));
+  if (p.motion.angle.size() > 0) {
+    add("alpha", p.motion.angle.array() + p.angle_offset[0], residual.angle_weight(), residual.angle_sigma());
+    fitted.channels.back().spikes = residual.spikes();
+  }
+  return fitted;
+}
+
+void describe_parameters(const JointProblem& joint, const Uncertainty& uncertainty, const StartValues& starts, FitResult& result) {
+  result.coloured = uncertainty.coloured;
+  for (std::size_t r = 0; r < joint.runs().size(); ++r) result.runs[r].whiteness = uncertainty.whiteness[r];
+  const auto all = static_cast<Index>(joint.unknowns().size());
+  const HeldInfluence influence = held_influence(joint);
+  std::vector<bool> identified(joint.unknowns().size(), true);
+  MatrixXd covariance = covariance_of_all(joint, uncertainty, influence, identified);
+  VectorXd with_others_held = VectorXd::Zero(all);
+  with_others_held(uncertainty.free) = uncertainty.covariance().diagonal().cwiseSqrt();
+  result.determined = determined_combinations(joint, influence, with_others_held);
+
+  for (Index i = 0; i < all; ++i) {
+    const auto which = static_cast<std::size_t>(i);
+    const Unknown& u = joint.unknowns()[which];
+    const Parameter& p = joint.parameter(u);
+    FittedParameter fitted;
+    fitted.name = p.name;
+    fitted.unit = p.unit;
+    fitted.run = u.run >= 0 ? joint.runs()[static_cast<std::size_t>(u.run)].run().file : "";
+    fitted.value = u.value;
+    fitted.start = start_of(p, starts);
+    fitted.std_error = std::nan("");
+    const auto position = std::find(uncertainty.free.begin(), uncertainty.free.end(), i);
+    if (position == uncertainty.free.end()) {
+      fitted.identified = false;
+      fitted.advice = u.why_held + fmt::format("; held at {:.6g}. ", u.value) + what_to_record(p.name);
+    } else {
+      const Index a = position - uncertainty.free.begin();
+      fitted.std_error = std::sqrt(covariance(i, i));
+      fitted.std_error_white = std::sqrt(uncertainty.white_covariance(a, a));
+      fitted.std_error_coloured = std::sqrt(uncertainty.coloured_covariance(a, a));
+      if (u.value <= p.lower || u.value >= p.upper) {
+        fitted.identified = false;
+        fitted.advice = fmt::format("It ended at its bound {}. ", u.value) + what_to_record(p.name);
+      } else if (!identified[which]) {
+        fitted.identified = false;
+        for (const DeterminedCombination& c : result.determined)
+          if (c.unknowns.front() == which) fitted.advice = fmt::format("Determined is only {}; the error is that with the rest of it held. {}", c.combination, c.settled_by);
+      }
+    }
+    result.parameters.push_back(fitted);
+  }
+  for (std::size_t r = 0; r < joint.runs().size(); ++r) add_steady_load(joint, r, uncertainty.coloured, covariance, result);
+  result.correlation = correlation_of(covariance);
+}
+
+void describe_profiles(const JointProblem& joint, const Uncertainty& uncertainty, const FitProblem& problem, FitResult& result) {
+  if (problem.profile.empty()) return;
+  const LeastSquaresProblem squares = joint.least_squares();
+  const MatrixXd white = uncertainty.white_covariance / std::max(1.0, result.reduced_chi2());
+  for (std::size_t i = 0; i < joint.unknowns().size(); ++i) {
+    const Unknown& u = joint.unknowns()[i];
+    const Parameter& p = joint.parameter(u);
+    const auto asked = [&](const std::string& name) { return name == p.name || name == short_name(joint, u) || (name == "all" && !u.held); };
+    if (std::none_of(problem.profile.begin(), problem.profile.end(), asked)) continue;
+    if (problem.progress) problem.progress("profile of " + short_name(joint, u));
+    ProfiledParameter profiled{p.name, u.run >= 0 ? joint.runs()[static_cast<std::size_t>(u.run)].run().file : "", p.unit, {}};
+    ProfileOptions options;
+    options.variance_factor = std::max(1.0, result.reduced_chi2());
+    const auto position = std::find(uncertainty.free.begin(), uncertainty.free.end(), static_cast<Index>(i));
+    if (const Index a = position - uncertainty.free.begin(); position != uncertainty.free.end()) options.variance_factor = uncertainty.covariance()(a, a) / white(a, a);
+    constexpr double one_deviation = 0.6826894921370859, usual = 0.95;
+    for (const double confidence : {one_deviation, usual}) {
+      options.confidence = confidence;
+      profiled.intervals.push_back(profile(squares, i, options));
+    }
+    result.profiles.push_back(std::move(profiled));
+  }
+}
+
+void warn_of_mismatch(FitResult& result) {
+  for (const FittedRun& run : result.runs) {
+    // Chi-square scatters by sqrt(2/n), the noise level that it counts in, and its square, by a few per cent.
+    const double expected = 1.2 + 5 * std::sqrt(2 / static_cast<double>(run.degrees_of_freedom));
+    if (run.reduced_chi2() < expected) continue;
+    std::string which;
+    for (const FittedChannel& c : run.channels)
+      if (c.rms_residual > 1.1 * c.noise) which += fmt::format("{}{} is left with {:.3g} {}, its noise is {:.3g}", which.empty() ? "" : ", ", c.name, c.rms_residual, c.unit, c.noise);
+    result.warnings.push_back(fmt::format("{}: the model does not explain this run (reduced chi-square {:.2f}; {}). Either the noise is coloured, which the standard errors allow for, "
+                                          "or physics is missing, and then the parameters may be further off than their errors say.",
+                                          run.file, run.reduced_chi2(), which.empty() ? "all channels together" : which));
+  }
+}
+
+}  // namespace unrig

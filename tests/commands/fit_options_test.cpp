@@ -1,0 +1,124 @@
+// `unrig fit` where the answer is not a plain number: what is determined instead, profile likelihood, start values, a model that does not explain a run.
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <random>
+#include <string>
+
+#include <nlohmann/json.hpp>
+
+#include "core/text_file.h"
+#include "tests/commands/run_unrig.h"
+
+namespace unrig {
+namespace {
+
+using nlohmann::json;
+using test::Finished;
+using test::run_unrig;
+using test::TemporaryDirectory;
+using ::testing::HasSubstr;
+
+constexpr double pi = 3.14159265358979, frequency = 4.8, damping = 0.03, mass = 2, noise = 0.05;
+const double stiffness = mass * std::pow(2 * pi * frequency, 2) * (1 + damping * damping);  // |pole|^2 m
+
+/// A free decay of one mode, with a tone that no rig explains.
+std::string decay(const TemporaryDirectory& directory, double tone = 0) {
+  std::mt19937 random(7);
+  std::normal_distribution<double> normal;
+  std::string text = "# unrig_run = 1\n# kind = \"pluck\"\n# density = \"1.2 kg/m^3\"\n# speed = \"0 m/s\"\ntime [s],gauge [N]\n";
+  for (int k = 0; k < 1000; ++k) {
+    const double t = 0.005 * k, w = 2 * pi * frequency;
+    text += std::to_string(t) + "," + std::to_string(10 * std::exp(-damping * w * t) * std::cos(w * t) + noise * normal(random) + tone * std::sin(2 * pi * 17 * t)) + "\n";
+  }
+  return directory.file("run.csv", text);
+}
+
+std::string rig_file(const TemporaryDirectory& directory) {
+  return directory.file("rig.toml", "unrig_rig = 1\nname = \"spring\"\n[[modal]]\nmass = \"2 kg\"\nfrequency = \"5 Hz\"\ndamping_ratio = 0.02\ngauge_gain = \"1000 N/m\"\n");
+}
+
+Finished fit_of(const TemporaryDirectory& directory, const std::string& run, const std::vector<std::string>& more) {
+  std::vector<std::string> arguments{"fit", "--rig", rig_file(directory), run, "-o", directory.path("fit.json")};
+  arguments.insert(arguments.end(), more.begin(), more.end());
+  return run_unrig(directory, arguments);
+}
+
+TEST(FitOptions, WhatIsDeterminedIsGivenWhereAParameterIsNot) {
+  const TemporaryDirectory directory;
+  const Finished finished = fit_of(directory, decay(directory), {});
+  ASSERT_EQ(finished.status, 0) << finished.err;
+  const json fit = json::parse(read_text(directory.path("fit.json")));
+  ASSERT_EQ(fit["determined"].size(), 2u);
+  const json& ratio = fit["determined"][0];
+  EXPECT_EQ(ratio["combination"], "modal[1].stiffness / modal[1].mass");
+  EXPECT_NEAR(ratio["value"].get<double>(), stiffness / mass, 3.5 * ratio["std_error"].get<double>());
+  EXPECT_LT(ratio["std_error"], 1e-3 * stiffness / mass);
+  EXPECT_THAT(ratio["settled_by"].get<std::string>(), HasSubstr("measured force"));
+  EXPECT_THAT(finished.out, HasSubstr("[[Determined]]\n    modal[1].stiffness / modal[1].mass = "));
+  for (const json& p : fit["parameters"]) EXPECT_EQ(p["identified"], false) << p;
+  EXPECT_EQ(finished.err.find("does not explain"), std::string::npos) << finished.err;
+}
+
+TEST(FitOptions, ProfileLikelihoodOfWhatIsAskedFor) {
+  const TemporaryDirectory directory;
+  const std::string run = decay(directory);
+  const Finished one = fit_of(directory, run, {"--profile", "modal[1].stiffness"});
+  ASSERT_EQ(one.status, 0) << one.err;
+  const json fit = json::parse(read_text(directory.path("fit.json")));
+  ASSERT_EQ(fit["profile"].size(), 1u);
+  EXPECT_EQ(fit["profile"][0]["name"], "modal[1].stiffness");
+  double error = 0;
+  for (const json& p : fit["parameters"])
+    if (p["name"] == "modal[1].stiffness") error = p["std_error"];
+  const json &likely = fit["profile"][0]["intervals"][0], &usual = fit["profile"][0]["intervals"][1];
+  // Frequencies are all but linear: the profile is the standard error, to the hundredth of one that a fit is searched to, twice.
+  EXPECT_NEAR((likely["upper"].get<double>() - likely["lower"].get<double>()) / (2 * error), 1, 0.02);
+  EXPECT_NEAR((usual["upper"].get<double>() - usual["lower"].get<double>()) / (2 * 1.959964 * error), 1, 0.02);
+  EXPECT_LT(usual["lower"], stiffness);
+  EXPECT_GT(usual["upper"], stiffness);
+  EXPECT_THAT(one.out, HasSubstr("[[Profile likelihood]]"));
+
+  ASSERT_EQ(fit_of(directory, run, {"--profile"}).status, 0);
+  EXPECT_EQ(json::parse(read_text(directory.path("fit.json")))["profile"].size(), 2u) << "the mass is held";
+}
+
+TEST(FitOptions, ProfileOfAParameterThatNothingDeterminesHasNoEnd) {
+  const TemporaryDirectory directory;
+  ASSERT_EQ(fit_of(directory, decay(directory), {"--profile", "modal[1].mass"}).status, 0);
+  const json fit = json::parse(read_text(directory.path("fit.json")));
+  // Stiffness and damping follow the mass as far as their bounds let them: the ends are those of the bounds, far away.
+  const json& usual = fit["profile"][0]["intervals"][1];
+  EXPECT_TRUE(usual["upper"].is_null() || usual["upper"] > 100 * mass) << usual;
+  EXPECT_TRUE(usual["lower"].is_null() || usual["lower"] < 0.01 * mass) << usual;
+}
+
+TEST(FitOptions, StartValuesAreReportedAsTheyWereGiven) {
+  const TemporaryDirectory directory;
+  ASSERT_EQ(fit_of(directory, decay(directory), {"--start", "modal[1].stiffness=1700"}).status, 0);
+  const json fit = json::parse(read_text(directory.path("fit.json")));
+  EXPECT_EQ(fit["parameters"][1]["name"], "modal[1].stiffness");
+  EXPECT_EQ(fit["parameters"][1]["start"], 1700);
+}
+
+TEST(FitOptions, NamesThatNoParameterHasAreRefused) {
+  const TemporaryDirectory directory;
+  for (const auto& [option, value] : {std::pair{"--start", "modal[2].mass=1"}, {"--profile", "stiffness"}}) {
+    const Finished finished = fit_of(directory, decay(directory), {option, value});
+    EXPECT_EQ(finished.status, 2);
+    EXPECT_THAT(finished.err, ::testing::AllOf(HasSubstr(option), HasSubstr("modal[1].stiffness")));
+  }
+}
+
+TEST(FitOptions, ARunThatTheModelDoesNotExplainIsNamed) {
+  const TemporaryDirectory directory;
+  const Finished finished = fit_of(directory, decay(directory, 10 * noise), {});
+  EXPECT_EQ(finished.status, 0);
+  EXPECT_THAT(finished.err, ::testing::AllOf(HasSubstr("run.csv: the model does not explain this run"), HasSubstr("gauge is left with")));
+  EXPECT_FALSE(json::parse(read_text(directory.path("fit.json")))["warnings"].empty());
+}
+
+}  // namespace
+}  // namespace unrig
