@@ -32,6 +32,7 @@ int fit_command(int argc, char** argv) {
     return app.exit(e) == 0 ? exit_done : exit_wrong_use;
   }
 
+  std::erase_if(problem.profile, [](const std::string& name) { return name.empty() || name == "{}"; });  // how CLI11 says that nothing follows
   if (profile->count() > 0 && problem.profile.empty()) problem.profile = {"all"};
   problem.rig = read_rig(rig_path);
   try {
