@@ -168,13 +168,13 @@ void refine_motion(JointProblem& joint, const FitProblem& problem, Windows& wind
 }
 
 /// Noise, motion, and what the data cannot determine: each looked at again once the model fits.
-Uncertainty settle(JointProblem& joint, const FitProblem& problem, Windows& windows, FitResult& result) {
+ParameterUncertainty settle(JointProblem& joint, const FitProblem& problem, Windows& windows, FitResult& result) {
   for (RunResidual& run : joint.runs()) {
     const std::size_t r = static_cast<std::size_t>(&run - joint.runs().data());
     run.settle_noise(joint.theta(r));
   }
   refine_motion(joint, problem, windows, result);
-  Uncertainty uncertainty = estimate_uncertainty(joint);
+  ParameterUncertainty uncertainty = estimate_uncertainty(joint);
   constexpr int rounds = 3;  // what was a line of the noise may turn out to be nothing at all once its damping is held
   for (int round = 0; round < rounds && hold_weak(joint, uncertainty, problem.start); ++round) {
     solve(joint, result);
@@ -275,7 +275,7 @@ FitResult fit(const FitProblem& problem) {
   hold_undetermined(joint);
   if (!problem.effects.empty()) joint = with_effects(complete, joint, problem, windows, result);
   result.effects = problem.effects;
-  const Uncertainty uncertainty = settle(joint, problem, windows, result);
+  const ParameterUncertainty uncertainty = settle(joint, problem, windows, result);
 
   const JointProblem::Linearisation lin = joint.linearise();
   result.chi2 = lin.chi2();

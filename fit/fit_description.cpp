@@ -27,7 +27,7 @@ double rms(const VectorXd& x, const VectorXd& weight) {
 
 /// Covariance of all unknowns (zero for those held) once what is held may be off by its ignorance. Unknowns that are lost with it are not identified:
 /// their covariance stays what it is with the others held.
-MatrixXd covariance_of_all(const JointProblem& joint, const Uncertainty& uncertainty, const HeldInfluence& influence, std::vector<bool>& identified) {
+MatrixXd covariance_of_all(const JointProblem& joint, const ParameterUncertainty& uncertainty, const HeldInfluence& influence, std::vector<bool>& identified) {
   const auto all = static_cast<Index>(joint.unknowns().size());
   MatrixXd covariance = MatrixXd::Zero(all, all), shift = influence.shift;
   covariance(uncertainty.free, uncertainty.free) = uncertainty.covariance();
@@ -116,7 +116,7 @@ FittedRun describe_run(const RunResidual& residual, const VectorXd& theta, doubl
   return fitted;
 }
 
-void describe_parameters(const JointProblem& joint, const Uncertainty& uncertainty, const StartValues& starts, FitResult& result) {
+void describe_parameters(const JointProblem& joint, const ParameterUncertainty& uncertainty, const StartValues& starts, FitResult& result) {
   result.coloured = uncertainty.coloured;
   for (std::size_t r = 0; r < joint.runs().size(); ++r) result.runs[r].whiteness = uncertainty.whiteness[r];
   const auto all = static_cast<Index>(joint.unknowns().size());
@@ -162,7 +162,7 @@ void describe_parameters(const JointProblem& joint, const Uncertainty& uncertain
   result.correlation = correlation_of(covariance);
 }
 
-void describe_profiles(const JointProblem& joint, const Uncertainty& uncertainty, const FitProblem& problem, FitResult& result) {
+void describe_profiles(const JointProblem& joint, const ParameterUncertainty& uncertainty, const FitProblem& problem, FitResult& result) {
   if (problem.profile.empty()) return;
   const LeastSquaresProblem squares = joint.least_squares();
   const MatrixXd white = uncertainty.white_covariance / std::max(1.0, result.reduced_chi2());

@@ -11,11 +11,11 @@ FittedRun describe_run(const RunResidual& residual, const Eigen::VectorXd& theta
 
 /// Standard errors and correlations of all unknowns and of the steady load of each run; what is determined where an unknown is not. The runs must have
 /// been described.
-void describe_parameters(const JointProblem& joint, const Uncertainty& uncertainty, const StartValues& starts, FitResult& result);
+void describe_parameters(const JointProblem& joint, const ParameterUncertainty& uncertainty, const StartValues& starts, FitResult& result);
 
 /// Profile-likelihood intervals of the unknowns that `problem` asks for. Chi-square counts in units of what its rise means: where residuals are coloured,
 /// the coloured variance over the plain one.
-void describe_profiles(const JointProblem& joint, const Uncertainty& uncertainty, const FitProblem& problem, FitResult& result);
+void describe_profiles(const JointProblem& joint, const ParameterUncertainty& uncertainty, const FitProblem& problem, FitResult& result);
 
 /// Warns of every run that the model does not explain to its noise: the error bars cannot tell how far that takes the parameters.
 void warn_of_mismatch(FitResult& result);

@@ -22,8 +22,8 @@ MatrixXd inverse_information(const MatrixXd& jacobian) {
 
 }  // namespace
 
-Uncertainty estimate_uncertainty(const JointProblem& joint) {
-  Uncertainty u;
+ParameterUncertainty estimate_uncertainty(const JointProblem& joint) {
+  ParameterUncertainty u;
   for (std::size_t i = 0; i < joint.unknowns().size(); ++i)
     if (!joint.unknowns()[i].held) u.free.push_back(static_cast<Index>(i));
   const auto unknown = [&](Index a) -> const Unknown& { return joint.unknowns()[static_cast<std::size_t>(u.free[static_cast<std::size_t>(a)])]; };

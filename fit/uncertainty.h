@@ -7,7 +7,7 @@
 namespace unrig {
 
 /// Covariance of the unknowns of a joint fit that are not held, both ways.
-struct Uncertainty {
+struct ParameterUncertainty {
   std::vector<Eigen::Index> free;        ///< which unknowns, in the order of the matrices
   Eigen::MatrixXd white_covariance;      ///< H^-1, times the reduced chi-square where that exceeds one
   Eigen::MatrixXd coloured_covariance;   ///< H^-1 (J^T Sigma J) H^-1 with the residuals' own spectra (fit/coloured_noise.h)
@@ -18,6 +18,6 @@ struct Uncertainty {
 };
 
 /// At the present values, which should be those of a finished fit.
-Uncertainty estimate_uncertainty(const JointProblem& joint);
+ParameterUncertainty estimate_uncertainty(const JointProblem& joint);
 
 }  // namespace unrig

@@ -68,7 +68,7 @@ double most_error(const JointProblem& joint, const Unknown& u) {
   return p.name.ends_with("damping_ratio") ? part * std::max(u.value, least_visible_damping(joint, p)) : ignorance(p, u.value);
 }
 
-bool hold_weak(JointProblem& joint, const Uncertainty& uncertainty, const StartValues& starts) {
+bool hold_weak(JointProblem& joint, const ParameterUncertainty& uncertainty, const StartValues& starts) {
   bool held = false;
   std::vector<Index> free = uncertainty.free;
   MatrixXd covariance = uncertainty.covariance();

@@ -24,7 +24,7 @@ double start_of(const Parameter& parameter, const StartValues& starts);
 
 /// Unknowns that the data hardly touch (an error of half of themselves, of a quarter for a damping ratio) go back to their start value and are held there, so that they cannot bend the others. One at a time, the weakest
 /// first: of two that are only determined together, one is enough. Returns whether any was held.
-bool hold_weak(JointProblem& joint, const Uncertainty& uncertainty, const StartValues& starts);
+bool hold_weak(JointProblem& joint, const ParameterUncertainty& uncertainty, const StartValues& starts);
 
 /// A combination of unknowns that the runs determine, although they do not determine each by itself.
 struct DeterminedCombination {

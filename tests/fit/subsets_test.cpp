@@ -11,6 +11,7 @@
 #include <nlohmann/json.hpp>
 
 #include "core/text_file.h"
+#include "fit/apparent_mass.h"
 #include "fit/fit.h"
 #include "tests/studies/campaign_maker.h"
 #include "tests/support/sample_data.h"
@@ -115,6 +116,27 @@ TEST(Undetermined, FreeDecayOfAModeFixesItsMassOnlyUpToAScale) {
   const FitResult both = fitted({"pluck", "forced_a"});
   EXPECT_TRUE(both.determined.empty());
   for (const FittedParameter& p : both.parameters) EXPECT_EQ(p.identified, !p.name.ends_with("mount_participation")) << p.name;
+}
+
+TEST(ApparentMassThreeWays, AgreeWithinTheirErrors) {
+  const auto run = [](const std::string& name) { return read_run(test::null_campaign(name + ".csv")); };
+  const Rig rig = read_rig(test::null_campaign("rig.toml"));
+  const auto joint = [&](const std::vector<std::string>& runs) -> Estimate {
+    FitProblem problem;
+    problem.rig = rig;
+    for (const std::string& name : runs) problem.runs.push_back(run(name));
+    for (const FittedParameter& p : fit(problem).parameters)
+      if (p.name == "apparent_mass_coefficient") return {p.value, p.std_error};
+    return {};
+  };
+  const ApparentMassResult shift = apparent_mass({rig, run("dry_pluck"), run("wet_pluck"), false, {}});
+  ASSERT_TRUE(shift.coefficient);
+  const Estimate frequencies = *shift.coefficient, decays = joint({"dry_pluck", "wet_pluck"}), steps = joint({"step_a", "step_b", "step_c"});
+  // The two ways through the free decays share their noise: they may differ by less than either errs. The steps are recordings of their own; 3 combined errors.
+  EXPECT_NEAR(frequencies.value, decays.value, decays.std_error);
+  EXPECT_NEAR(decays.value, steps.value, 3 * std::hypot(decays.std_error, steps.std_error));
+  EXPECT_NEAR(frequencies.value, steps.value, 3 * std::hypot(frequencies.std_error, steps.std_error));
+  EXPECT_LT(steps.std_error, 0.002) << "agreement within an error that wide would say nothing";
 }
 
 }  // namespace
