@@ -98,9 +98,11 @@ bool hold_weak(JointProblem& joint, const ParameterUncertainty& uncertainty, con
 }
 
 HeldInfluence held_influence(const JointProblem& joint) {
-  const MatrixXd jacobian = joint.linearise().jacobian;
   const auto& unknowns = joint.unknowns();
   HeldInfluence influence;
+  influence.slope = influence.shift = MatrixXd::Zero(static_cast<Index>(unknowns.size()), 0);
+  if (std::none_of(unknowns.begin(), unknowns.end(), [](const Unknown& u) { return u.held; })) return influence;
+  const MatrixXd jacobian = joint.linearise().jacobian;
   std::vector<Index> free;
   for (std::size_t i = 0; i < unknowns.size(); ++i) {
     const auto column = static_cast<Index>(i);
