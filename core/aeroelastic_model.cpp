@@ -91,10 +91,10 @@ RowVectorXd gauge_arms(const Rig& rig) {
 /// Column positions of the extended coordinates' displacement, rate and acceleration in the state and the inputs.
 /// Prescribed coordinates have theirs in the motion states (pitch) and in the inputs (heave).
 struct Layout {
-  Index coordinates, lags, motion, states, inputs, force = -1, mount = -1, strip_force = -1;
+  Index coordinates, lags, motion, states, inputs, force = -1, mount = -1, strip_port = -1, coordinate_port = -1;
 };
 
-Layout layout_of(Index coordinates, Index lags, const Conditions& conditions) {
+Layout layout_of(Index coordinates, Index lags, Index strips, const Conditions& conditions) {
   Layout l{coordinates, lags, -1, 2 * coordinates + lags, 0};
   if (conditions.prescribed_pitch) {
     l.motion = l.states;
@@ -105,7 +105,11 @@ Layout layout_of(Index coordinates, Index lags, const Conditions& conditions) {
     l.mount = l.inputs;
     l.inputs += 2;
   }
-  if (conditions.strip_force) l.strip_force = l.inputs++;
+  if (conditions.ports) {
+    l.strip_port = l.inputs;
+    l.coordinate_port = l.strip_port + strips;
+    l.inputs = l.coordinate_port + coordinates;
+  }
   return l;
 }
 
@@ -139,6 +143,21 @@ class Rows {
   DualMatrix dual;
 };
 
+/// Of the inputs that a system with ports has, only those the run records, and what the feedback drives.
+void keep_inputs(LinearSystem& system, const Conditions& conditions) {
+  std::vector<Index> kept;
+  if (conditions.force) kept.push_back(0);
+  if (conditions.mount) kept.insert(kept.end(), {1, 2});
+  const auto feedbacks = static_cast<Index>(system.feedback.size());
+  for (Index k = system.B.cols() - feedbacks; k < system.B.cols(); ++k) kept.push_back(k);
+  for (DualMatrix* m : {&system.B, &system.D}) {
+    DualMatrix part(MatrixXd(m->rows(), static_cast<Index>(kept.size())), m->parameters());
+    for (std::size_t k = 0; k < kept.size(); ++k) part.set_block(0, static_cast<Index>(k), m->block(0, kept[k], m->rows(), 1));
+    *m = std::move(part);
+  }
+  for (Feedback& f : system.feedback) f.sees.conservativeResizeLike(RowVectorXd::Zero(system.states()));  // states that came later
+}
+
 double sensor_gain(const Sensor& sensor) { return sensor.gain; }
 
 /// A run must have what its kind says drives the rig, and the rig must be able to answer to it.
@@ -163,6 +182,17 @@ void check_gauge_unit(const Run& run, const Rig& rig) {
                    raw ? "Write the calibration into the meta data." : "Give the rig file of this run.");
 }
 
+/// Median of the first samples: the angle before the shaft moves.
+double first_angle(const VectorXd& alpha) {
+  std::vector<double> first;
+  constexpr std::size_t enough = 25;
+  for (const double x : alpha)
+    if (std::isfinite(x) && first.size() < enough) first.push_back(x);
+  if (first.empty()) return 0;
+  std::nth_element(first.begin(), first.begin() + static_cast<std::ptrdiff_t>(first.size() / 2), first.end());
+  return first[first.size() / 2];
+}
+
 }  // namespace
 
 Conditions conditions_of(const Run& run) {
@@ -172,6 +202,7 @@ Conditions conditions_of(const Run& run) {
   c.prescribed_pitch = run.find("alpha") != nullptr && run.kind == RunKind::step;
   c.force = run.find("force") != nullptr;
   c.mount = run.find("mount_velocity") != nullptr || run.find("mount_acceleration") != nullptr;
+  if (const Channel* alpha = run.find("alpha")) c.onset_angle = first_angle(alpha->value);
   return c;
 }
 
@@ -248,31 +279,29 @@ std::vector<std::string> AeroelasticModel::output_channels(const Run& run) const
 }
 
 LinearSystem AeroelasticModel::system(const Conditions& conditions, const VectorXd& theta, const std::vector<std::string>& channels) const {
-  if (rig_.is_modal()) return modal_system(conditions, theta, channels);
-  if (effects_.empty()) return beam_system(conditions, theta, channels);
+  if (effects_.empty()) return rig_.is_modal() ? modal_system(conditions, theta, channels) : beam_system(conditions, theta, channels);
 
-  Conditions with_port = conditions;
-  with_port.strip_force = true;
-  LinearSystem system = beam_system(with_port, theta, channels);
-  const Index port = system.B.cols() - 1;
+  Conditions with_ports = conditions;
+  with_ports.force = with_ports.mount = with_ports.ports = true;
+  LinearSystem system = rig_.is_modal() ? modal_system(with_ports, theta, channels) : beam_system(with_ports, theta, channels);
+  const auto strips = static_cast<Index>(rig_.submerged.size());
   const auto gauge = std::find(channels.begin(), channels.end(), "gauge");
   Index first = theta.size();
   for (const std::string& id : effects_) first -= static_cast<Index>(effect(id).parameters.size());
   for (const std::string& id : effects_) {
     const Effect& e = effect(id);
-    const EffectContext context{*this, conditions, theta, first, gauge == channels.end() ? Index{-1} : gauge - channels.begin(), port};
+    const EffectContext context{*this, conditions, theta, first, gauge == channels.end() ? Index{-1} : gauge - channels.begin(), Ports{0, 1, 3, strips, 3 + strips, system.coordinates}};
     if (e.acts(conditions)) e.apply(system, context);
     first += static_cast<Index>(e.parameters.size());
   }
-  system.B = system.B.block(0, 0, system.B.rows(), port);
-  system.D = system.D.block(0, 0, system.D.rows(), port);
+  keep_inputs(system, conditions);
   return system;
 }
 
 AeroelasticModel AeroelasticModel::with_effects(const std::vector<std::string>& ids) const {
-  if (rig_.is_modal()) throw std::invalid_argument("a rig known only as modes has no place for effects yet");
   AeroelasticModel model = *this;
   for (const std::string& id : ids) {
+    if (rig_.is_modal() && !effect(id).on_modal_rigs) throw std::invalid_argument(fmt::format("the effect {} needs a beam rig; '{}' is known only as modes", id, rig_.name));
     for (Parameter p : effect(id).parameters) {
       p.name = id + "." + p.name;
       model.parameters_.push_back(p);
@@ -289,7 +318,7 @@ LinearSystem AeroelasticModel::beam_system(const Conditions& conditions, const V
   const Strips strips = strips_of(rig_, k);
   const Index n = k.n, strip_count = strips.normal.rows(), parameters = static_cast<Index>(parameters_.size());
   const Index terms = U > 0 ? circulation_.rate.size() : 0;
-  const Layout layout = layout_of(n, terms * strip_count, conditions);
+  const Layout layout = layout_of(n, terms * strip_count, strip_count, conditions);
   const auto rows = [&](Index count) { return Rows(count, layout, parameters); };
 
   // Mass matrix: structure and apparent mass (never on the force side, where heavy fluid makes it unstable).
@@ -346,8 +375,8 @@ LinearSystem AeroelasticModel::beam_system(const Conditions& conditions, const V
   force.add_prescribed_acceleration(-inertia.topRows(n));
   force.dual.add_partial(apparent_mass, -force.prescribed_acceleration(wet.topRows(n)));
   if (layout.force >= 0) force.dual.value.col(layout.states + layout.force) += normal_n.row(rig_.calibration_element - 1).transpose();
-  const MatrixXd even = MatrixXd::Constant(1, strip_count, 1.0 / static_cast<double>(std::max<Index>(1, strip_count)));
-  if (layout.strip_force >= 0) force.dual.value.col(layout.states + layout.strip_force) += (even * strips.normal.leftCols(n)).transpose();
+  if (layout.strip_port >= 0) force.dual.value.middleCols(layout.states + layout.strip_port, strip_count) += strips.normal.leftCols(n).transpose();
+  if (layout.coordinate_port >= 0) force.dual.value.middleCols(layout.states + layout.coordinate_port, n) += MatrixXd::Identity(n, n);
   const DualMatrix acceleration = solve(mass, force.dual);
 
   // State equation.
@@ -385,7 +414,7 @@ LinearSystem AeroelasticModel::beam_system(const Conditions& conditions, const V
       MatrixXd strip_arms(1, strip_count);
       for (Index s = 0; s < strip_count; ++s) strip_arms(0, s) = arms[rig_.submerged[static_cast<std::size_t>(s)] - 1];
       reading = reading + strip_arms * circulatory.dual;
-      if (layout.strip_force >= 0) reading.value(0, layout.states + layout.strip_force) += (even * strip_arms.transpose()).value();
+      if (layout.strip_port >= 0) reading.value.middleCols(layout.states + layout.strip_port, strip_count) += strip_arms;
       if (layout.force >= 0) reading.value(0, layout.states + layout.force) += arms[rig_.calibration_element - 1];
       outputs.set_block(row, 0, reading);
       continue;
@@ -419,7 +448,7 @@ LinearSystem AeroelasticModel::modal_system(const Conditions& conditions, const 
   Conditions without_pitch = conditions;
   without_pitch.prescribed_pitch = false;
   const auto n = static_cast<Index>(rig_.modal.size());
-  const Layout layout = layout_of(n, 0, without_pitch);
+  const Layout layout = layout_of(n, 0, 0, without_pitch);
   const Index columns = layout.states + layout.inputs, parameters = static_cast<Index>(parameters_.size());
   DualMatrix state(MatrixXd::Zero(layout.states, columns), parameters);
   DualMatrix output(MatrixXd::Zero(static_cast<Index>(channels.size()), columns), parameters);
@@ -439,6 +468,7 @@ LinearSystem AeroelasticModel::modal_system(const Conditions& conditions, const 
     set(n + i, -damping, first + 2, -1);
     if (layout.force >= 0) set(layout.states + layout.force, 1, -1, 0);
     if (layout.mount >= 0) set(layout.states + layout.mount + 1, -participation, first + 3, -1);
+    if (layout.coordinate_port >= 0) set(layout.states + layout.coordinate_port + i, 1, -1, 0);
     for (Index c = 0; c < output.rows(); ++c) output.value(c, i) = rig_.modal[static_cast<std::size_t>(i)].gauge_gain;
   }
   LinearSystem system;

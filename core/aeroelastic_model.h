@@ -29,7 +29,17 @@ struct Conditions {
   bool prescribed_pitch = false;  ///< carry angle, rate and acceleration of the shaft as states
   bool force = false;             ///< a measured force at the calibration station
   bool mount = false;             ///< the mount moves: inputs velocity and acceleration
-  bool strip_force = false;       ///< a further input, last: one newton spread evenly over the strips
+  double onset_angle = 0;  ///< rad, of the shaft before it moves; 0 where the run has no angle
+  bool ports = false;      ///< further inputs behind these: a normal force on each strip [N], a generalised force on each coordinate
+};
+
+/// A static nonlinear force f(z) that rides on the linear system: it drives one input column and looks at one combination of the states.
+struct Feedback {
+  Eigen::RowVectorXd sees;          ///< z = sees x, a displacement or a rate
+  Eigen::Index first_parameter = 0; ///< of the law, in theta
+  Eigen::Index parameters = 0;
+  /// f(z) for the parameters p, and its derivatives in z and in each of p.
+  double (*law)(double z, const double* p, double& slope, double* partial) = nullptr;
 };
 
 /// The coupled model of one run as a linear state equation with exact partial derivatives in theta:
@@ -38,10 +48,11 @@ struct Conditions {
 ///
 /// States: modal displacements, modal velocities, aerodynamic lags (term by term, strip by strip; none at speed 0), and where the pitch is
 /// prescribed its angle p, rate and acceleration, driven by the jerk (piecewise constant for a cubic spline).
-/// Inputs u: force [N]; mount velocity [m/s] and acceleration [m/s^2] (whichever `Conditions` has, in this order).
+/// Inputs u: force [N]; mount velocity [m/s] and acceleration [m/s^2] (whichever `Conditions` has, in this order), then what `feedback` drives.
 /// Outputs y: the run's fitted channels, in the order of `outputs`.
 struct LinearSystem {
   DualMatrix A, B, C, D;
+  std::vector<Feedback> feedback;  ///< nonlinear forces; they drive the last columns of B and D
   Eigen::Index coordinates = 0;
   Eigen::Index lags = 0;
   Eigen::Index motion = -1;  ///< index of the state p, or -1
@@ -80,7 +91,7 @@ class AeroelasticModel {
   AeroelasticModel(Rig rig, Basis basis, IndicialFunction circulation, Circulation build_up = Circulation::given);
 
   /// The same rig with these effects at work (ids of core/effects/table.cpp), their parameters behind the model's own, named "id.parameter".
-  /// Throws std::invalid_argument for an id that does not exist or a rig that has no place for effects (modal).
+  /// Throws std::invalid_argument for an id that does not exist or one that needs what this rig does not have (strips, a gauge).
   AeroelasticModel with_effects(const std::vector<std::string>& ids) const;
   const std::vector<std::string>& effect_ids() const { return effects_; }
 

@@ -7,6 +7,7 @@
 #include "correct/correct_command.h"
 #include "correct/report/report_command.h"
 #include "fit/apparent_mass_command.h"
+#include "fit/diagnose/diagnose_command.h"
 #include "fit/fit_command.h"
 #include "fit/simulate_command.h"
 
@@ -16,6 +17,7 @@ constexpr unrig::Command commands[] = {
     {"simulate", "simulate what gauge and sensors of a rig read in a run", unrig::simulate_command},
     {"fit", "fit stiffness, damping and apparent mass of a rig to recordings", unrig::fit_command},
     {"apparent-mass", "apparent mass of the fluid from the frequencies of a dry and a wet free decay", unrig::apparent_mass_command},
+    {"diagnose", "where recordings and model differ, and which physics was left out", unrig::diagnose_command},
     {"correct", "take the rig out of a gauge record: rigid-rig load and indicial response", unrig::correct_command},
     {"report", "show results as one HTML file: traces, residuals, spectra, parameters", unrig::report_command},
 };

@@ -101,6 +101,7 @@ struct FitResult {
 FitResult fit(const FitProblem& problem);
 
 /// The model of a set of runs: one basis, rich enough for all of them.
-AeroelasticModel model_of(const Rig& rig, const std::vector<Run>& runs, Wagner circulation);
+/// With effects at work their parameters are among the model's; `higher-mode` takes all modes that the rig has.
+AeroelasticModel model_of(const Rig& rig, const std::vector<Run>& runs, Wagner circulation, const std::vector<std::string>& effects = {});
 
 }  // namespace unrig

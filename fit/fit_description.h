@@ -1,4 +1,5 @@
 #pragma once
+#include "fit/arrival.h"
 #include "fit/fit.h"
 #include "fit/joint_problem.h"
 #include "fit/uncertainty.h"
@@ -6,6 +7,9 @@
 namespace unrig {
 
 /// What a finished fit says of itself.
+
+/// All of it. `settled` is false where noise levels, spikes and the motion's windows should first be looked at again, and what the data cannot determine be held.
+FitResult describe_fit(Arrival& arrival, const FitProblem& problem, bool settled = false);
 
 FittedRun describe_run(const RunResidual& residual, const Eigen::VectorXd& theta, double chi2);
 

@@ -171,6 +171,7 @@ void RunResidual::keep_noise_of(const RunResidual& other) {
   angle_ = other.angle_;
   angle_weight_ = other.angle_weight_;
   spikes_ = other.spikes_;
+  tempered_ = other.tempered_;
   prepare_angle_rows();
 }
 

@@ -1,5 +1,6 @@
 #pragma once
 #include <Eigen/Core>
+#include <functional>
 #include <memory>
 #include <string>
 #include <vector>
@@ -22,6 +23,11 @@ struct RunOptions {
 /// included), and the angle before the motion. Both the angle and the gauge are measured: sum over channels of
 /// ((y_measured - y(theta, c)) / sigma)^2 is least over c for every theta (variable projection, Golub and Pereyra 1973), so that a nonlinear solver
 /// sees only theta.
+///
+/// With nonlinear effects at work the linear unknowns enter nonlinearly too, and c is searched for at every theta: in runs without prescribed motion by
+/// Gauss-Newton steps along exact tangents (core/nonlinear_response.h); in runs with it along those of the equivalent linear system (force and state by
+/// least squares along the response), because exact ones would cost n x n x (knots) a sample. The prediction itself and its partials in theta are exact in
+/// both; where c stops is then off by the difference of the tangents times what the residual happens to hold of them, a small part of c's own error.
 ///
 /// Long stretches without jerk are compressed exactly: their rows span only the free response of the model, an n-dimensional space.
 class RunResidual {
@@ -65,6 +71,9 @@ class RunResidual {
   };
   Prediction predict(const Eigen::VectorXd& theta) const;
 
+  /// The largest argument that the law of each nonlinear effect sees at theta; empty for a linear model.
+  Eigen::VectorXd largest_arguments(const Eigen::VectorXd& theta) const;
+
   /// Parameters with respect to which `evaluate` differentiates; the other columns of the Jacobian are zero, and cost nothing. Empty: all.
   void differentiate_only(std::vector<Eigen::Index> parameters) { differentiated_ = std::move(parameters); }
 
@@ -105,6 +114,11 @@ class RunResidual {
   /// The same run with other windows of motion; noise levels and samples left out stay as they are.
   RunResidual with_motion(std::vector<MotionBasis::Window> windows) const;
 
+  /// Starts the search for c, where it needs one, from that of the same run held against another model or over another horizon.
+  void start_from(const RunResidual& other) {
+    if (other.last_linear_.size() == unknowns_) last_linear_ = other.last_linear_;
+  }
+
   /// Takes over noise levels and samples left out from the same run held against another model.
   void keep_noise_of(const RunResidual& other);
 
@@ -112,6 +126,14 @@ class RunResidual {
   /// a fast signal. Differences do not see a slow mismatch: of first order (the most
   /// efficient), unless those of third order are smaller by more than chance.
   void settle_noise(const Eigen::VectorXd& theta);
+
+  /// Lets every fitted channel count as if its noise were `factor` times what it is; replaces an earlier factor. While physics is missing, runs that it is far from
+  /// explaining must not drown the others.
+  void temper(double factor) {
+    weight_ *= tempered_ / factor;
+    tempered_ = factor;
+  }
+  double tempered() const { return tempered_; }
 
   Eigen::VectorXd channel_weight(std::size_t channel) const { return weight_.col(static_cast<Eigen::Index>(channel)); }
   const Eigen::VectorXd& angle_weight() const { return angle_weight_; }
@@ -123,8 +145,20 @@ class RunResidual {
   };
   std::shared_ptr<Linearised> linearise(const Eigen::VectorXd& theta) const;
   void stack_rows(Linearised& lin) const;
-  template <class Take>
-  void follow_partials(const Eigen::VectorXd& theta, const Eigen::VectorXd& linear, Take take) const;
+  Eigen::VectorXd whole_jerk(const Eigen::VectorXd& linear) const;
+  bool stack_nonlinear_rows(Linearised& lin, const Eigen::VectorXd& theta, const Eigen::VectorXd& linear) const;
+  struct NonlinearPoint;
+  NonlinearPoint nonlinear_point(const Linearised& lin, const Eigen::VectorXd& theta, const Eigen::VectorXd& linear) const;
+  std::shared_ptr<Linearised> equivalent_linear(const Linearised& lin, const Eigen::VectorXd& slope) const;
+  void solve_nonlinear(Linearised& lin, const Eigen::VectorXd& theta) const;
+  void search_along_tangents(Linearised& lin, const Eigen::VectorXd& theta, NonlinearPoint point) const;
+  void search_along_equivalent(Linearised& lin, const Eigen::VectorXd& theta, NonlinearPoint point) const;
+  Eigen::MatrixXd prediction_slope(const Linearised& lin, std::size_t block, const Eigen::MatrixXd& linear_slope) const;
+  void prepare_linear(Linearised& lin) const;
+  using TakeRows = std::function<void(const Interval& samples, Eigen::Index channel, Eigen::MatrixXd rows)>;
+  void follow_partials(const Eigen::VectorXd& theta, const Eigen::VectorXd& linear, const TakeRows& take) const;
+  void follow_nonlinear_partials(const LinearSystem& system, const Eigen::VectorXd& theta, const Eigen::VectorXd& linear, const TakeRows& take) const;
+  Eigen::MatrixXd jerk_slope(const Interval& samples) const;
   LinearSystem differentiable_system(const Eigen::VectorXd& theta) const;
   Eigen::MatrixXd motion_state_columns(const Linearised& lin, Eigen::Index sample) const;
   Interval counted(const Segment& segment) const;
@@ -142,6 +176,7 @@ class RunResidual {
   Eigen::MatrixXd measured_;  ///< samples x channels, missing samples 0
   Eigen::MatrixXd weight_;    ///< 1 / sigma, 0 where left out
   std::vector<double> sigma_;
+  double tempered_ = 1;
   Eigen::VectorXd angle_, angle_weight_;
   double angle_sigma_ = 0;
   Eigen::MatrixXd motion_prior_;  ///< [c | 0]
@@ -150,6 +185,8 @@ class RunResidual {
   Eigen::MatrixXd inputs_;  ///< samples + 1 rows
   Eigen::Index spikes_ = 0;
   Eigen::Index last_sample_ = 0;
+
+  mutable Eigen::VectorXd last_linear_;  ///< c of the last nonlinear solution, from which the next one starts
 
   // Layout of c.
   std::vector<Eigen::Index> free_;  ///< states whose initial value is unknown

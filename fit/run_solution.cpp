@@ -1,8 +1,8 @@
-#include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
 
-#include "fit/run_residual.h"
+#include "core/nonlinear_response.h"
+#include "fit/run_linearised.h"
 
 // The arithmetic behind RunResidual: rows of the linear unknowns, their elimination, and what theta does beside them.
 
@@ -13,25 +13,10 @@ using Eigen::MatrixXd;
 using Eigen::RowVectorXd;
 using Eigen::VectorXd;
 
+using run_rows::compress;
+using run_rows::stacked;
+
 namespace {
-
-/// The upper triangular (or trapezoidal) factor of `rows`: the same inner products in no more rows than columns.
-MatrixXd compress(MatrixXd rows) {
-  const Eigen::HouseholderQR<Eigen::Ref<MatrixXd>> qr(rows);  // in place
-  return rows.topRows(std::min(rows.rows(), rows.cols())).triangularView<Eigen::Upper>();
-}
-
-MatrixXd stacked(const std::vector<MatrixXd>& blocks, Index columns) {
-  Index total = 0;
-  for (const MatrixXd& block : blocks) total += block.rows();
-  MatrixXd stack(total, columns);
-  Index row = 0;
-  for (const MatrixXd& block : blocks) {
-    stack.middleRows(row, block.rows()) = block;
-    row += block.rows();
-  }
-  return stack;
-}
 
 MatrixXd power(MatrixXd base, Index exponent) {
   MatrixXd result = MatrixXd::Identity(base.rows(), base.cols());
@@ -42,90 +27,7 @@ MatrixXd power(MatrixXd base, Index exponent) {
   return result;
 }
 
-/// Least squares by column-scaled QR. Columns that the rows do not determine (a state that no channel sees) are left at zero.
-class Eliminator {
- public:
-  explicit Eliminator(const MatrixXd& columns) : scale_(columns.colwise().norm().transpose().cwiseMax(1e-300).cwiseInverse()) {
-    constexpr double rank_tolerance = 1e-11;
-    const MatrixXd scaled = columns * scale_.asDiagonal();
-    quick_.compute(scaled);
-    if (columns.rows() >= columns.cols() && (columns.cols() == 0 || quick_.matrixQR().diagonal().cwiseAbs().minCoeff() > rank_tolerance)) return;
-    pivoted_.setThreshold(rank_tolerance);
-    pivoted_.compute(scaled);
-    deficient_ = true;
-  }
-  Index rank() const { return deficient_ ? pivoted_.rank() : scale_.size(); }
-  /// Coordinates of `rows` in the columns' space (the first `rank` rows) and beside it.
-  MatrixXd rotated(const MatrixXd& rows) const {
-    return deficient_ ? MatrixXd(pivoted_.householderQ().setLength(pivoted_.rank()).adjoint() * rows) : MatrixXd(quick_.householderQ().adjoint() * rows);
-  }
-  /// Solution of R x = rotated, back in the columns' own scale.
-  MatrixXd solve(const MatrixXd& rotated) const {
-    const Index r = rank();
-    MatrixXd x = MatrixXd::Zero(scale_.size(), rotated.cols());
-    if (deficient_) {
-      x.topRows(r) = pivoted_.matrixQR().topLeftCorner(r, r).triangularView<Eigen::Upper>().solve(rotated.topRows(r));
-      x = pivoted_.colsPermutation() * x;
-    } else {
-      x = quick_.matrixQR().topLeftCorner(r, r).triangularView<Eigen::Upper>().solve(rotated.topRows(r));
-    }
-    return scale_.asDiagonal() * x;
-  }
-  /// R with R^T R = the columns' information matrix. Only where all columns are determined is it regular.
-  MatrixXd factor() const {
-    const Index n = scale_.size();
-    MatrixXd r = MatrixXd::Zero(n, n);
-    if (deficient_) {
-      const Index k = rank();
-      MatrixXd permuted = MatrixXd::Zero(n, n);
-      permuted.topRows(k) = MatrixXd(pivoted_.matrixQR().topRows(k).triangularView<Eigen::Upper>());
-      r = permuted * pivoted_.colsPermutation().transpose();
-      r = compress(r);
-    } else {
-      r = quick_.matrixQR().topRows(n).triangularView<Eigen::Upper>();
-    }
-    return r * scale_.cwiseInverse().asDiagonal();
-  }
-
- private:
-  VectorXd scale_;
-  Eigen::HouseholderQR<MatrixXd> quick_;
-  Eigen::ColPivHouseholderQR<MatrixXd> pivoted_;
-  bool deficient_ = false;
-};
-
 }  // namespace
-
-/// The model at one theta, without partials: its exact step, what the inputs alone do, where the unknown motion takes the states, and the rows
-/// of the linear unknowns.
-struct RunResidual::Linearised {
-  LinearSystem system;
-  ExactStep step;
-  MatrixXd known;          // response to the measured inputs, samples x channels, empty without
-  MatrixXd spline;         // states after a unit spline, n x samples
-  MatrixXd spline_summed;  // and their running sum: states after splines at every sample
-  std::vector<MatrixXd> free;  // rows of the free response per channel, for the longest segment at rest
-
-  /// One channel over one segment. A segment at rest spans only the free response and the offset: `at_rest` rotates its rows so that the first
-  /// `kept` of them hold all that c can reach, and the others only what is left.
-  struct Block {
-    Interval samples;
-    bool moving = false;
-    Index channel = 0, kept = 0;
-    std::shared_ptr<const Eigen::HouseholderQR<MatrixXd>> at_rest;
-
-    /// Weighted rows of this block: those that c reaches, and the others.
-    std::pair<MatrixXd, MatrixXd> split(MatrixXd rows) const {
-      if (moving) return {std::move(rows), MatrixXd()};
-      rows.applyOnTheLeft(at_rest->householderQ().adjoint());
-      return {rows.topRows(kept), rows.bottomRows(rows.rows() - kept)};
-    }
-  };
-  std::vector<Block> blocks;
-  std::unique_ptr<Eliminator> eliminate;
-  VectorXd linear;
-  double chi2 = 0;
-};
 
 VectorXd RunResidual::initial_state(const VectorXd& linear, Index states) const {
   VectorXd state = VectorXd::Zero(states);
@@ -140,20 +42,25 @@ std::shared_ptr<RunResidual::Linearised> RunResidual::linearise(const VectorXd& 
   lin->system = model_->system(conditions_, theta, channels_);
   for (DualMatrix* m : {&lin->system.A, &lin->system.B, &lin->system.C, &lin->system.D}) m->partial.clear();
   lin->step = exact_step(lin->system, run_->dt);
+  if (lin->system.feedback.empty()) prepare_linear(*lin);
+  return lin;
+}
+
+/// Responses that the rows of a linear system are made of.
+void RunResidual::prepare_linear(Linearised& lin) const {
   if (inputs_.cols() > 0)
-    lin->known = drive(lin->system, lin->step, DualMatrix(MatrixXd::Zero(lin->system.states(), 1)), run_->samples(), {}, inputs_, Partials::none).output;
+    lin.known = drive(lin.system, lin.step, DualMatrix(MatrixXd::Zero(lin.system.states(), 1)), run_->samples(), {}, inputs_, Partials::none).output;
   Index longest = 0, last_motion = 0;
   for (const Segment& s : segments_) {
     if (s.moving) last_motion = s.samples.last;
     if (!s.moving || !free_.empty()) longest = std::max(longest, counted(s).length());
   }
-  lin->free = free_response_rows(lin->system, lin->step, longest);
+  lin.free = free_response_rows(lin.system, lin.step, longest);
   if (motion_.unknowns() > 0) {
-    lin->spline = spline_states(lin->step, last_motion + 1 - motion_.columns().front().first);
-    lin->spline_summed = lin->spline;
-    for (Index k = 1; k < lin->spline.cols(); ++k) lin->spline_summed.col(k) += lin->spline_summed.col(k - 1);
+    lin.spline = spline_states(lin.step, last_motion + 1 - motion_.columns().front().first);
+    lin.spline_summed = lin.spline;
+    for (Index k = 1; k < lin.spline.cols(); ++k) lin.spline_summed.col(k) += lin.spline_summed.col(k - 1);
   }
-  return lin;
 }
 
 /// d output / d motion unknowns over a segment in which the shaft moves: the response to one spline, shifted.
@@ -201,7 +108,6 @@ MatrixXd RunResidual::segment_start(const Linearised& lin, const Interval& sampl
 
 /// All rows [c | y], those of segments at rest rotated and cut to what c can reach; solves for c.
 void RunResidual::stack_rows(Linearised& lin) const {
-  const Index states = lin.system.states();
   std::vector<MatrixXd> rows;
   double unreachable = 0;
   for (const Segment& segment : segments_) {
@@ -214,7 +120,7 @@ void RunResidual::stack_rows(Linearised& lin) const {
       VectorXd y = measured_.col(c).segment(s.first, length);
       if (lin.known.size() > 0) y -= lin.known.col(c).segment(s.first, length);
       y = w.cwiseProduct(y);
-      Linearised::Block block{s, segment.moving, c, length, nullptr};
+      Linearised::Block block{s, segment.moving, c, length, nullptr, {}, {}};
       MatrixXd reach;
       if (segment.moving) {
         reach = MatrixXd::Zero(length, unknowns_);
@@ -223,15 +129,7 @@ void RunResidual::stack_rows(Linearised& lin) const {
         reach.col(first_offset_ + c).setOnes();
         reach = w.asDiagonal() * reach;
       } else {
-        MatrixXd span(length, states + 1);
-        span.leftCols(states) = w.asDiagonal() * lin.free[static_cast<std::size_t>(c)].topRows(length);
-        span.col(states) = w;
-        block.kept = std::min(length, states + 1);
-        const auto qr = std::make_shared<const Eigen::HouseholderQR<MatrixXd>>(std::move(span));
-        block.at_rest = qr;
-        const MatrixXd triangle = qr->matrixQR().topRows(block.kept).triangularView<Eigen::Upper>();
-        reach = triangle.leftCols(states) * start;
-        reach.col(first_offset_ + c) += triangle.col(states);
+        reach = block.rotate(w, lin.free[static_cast<std::size_t>(c)].topRows(length), start, first_offset_ + c);
       }
       const auto [reached, others] = block.split(std::move(y));
       unreachable += others.squaredNorm();
@@ -242,16 +140,15 @@ void RunResidual::stack_rows(Linearised& lin) const {
     }
   }
   rows.insert(rows.end(), angle_rows_.begin(), angle_rows_.end());
-  const MatrixXd stack = stacked(rows, unknowns_ + 1);
-  lin.eliminate = std::make_unique<Eliminator>(stack.leftCols(unknowns_));
-  const MatrixXd rotated = lin.eliminate->rotated(stack.rightCols(1));
-  lin.linear = lin.eliminate->solve(rotated);
-  lin.chi2 = unreachable + rotated.bottomRows(rotated.rows() - lin.eliminate->rank()).squaredNorm();
+  lin.settle(rows, unknowns_, unreachable);
 }
 
 RunResidual::Solution RunResidual::solve(const VectorXd& theta) const {
   const std::shared_ptr<Linearised> lin = linearise(theta);
-  stack_rows(*lin);
+  if (lin->system.feedback.empty())
+    stack_rows(*lin);
+  else
+    solve_nonlinear(*lin, theta);
   return {theta, lin->chi2, lin->linear, lin};
 }
 
@@ -282,9 +179,9 @@ MatrixXd slopes_and_prediction(const Response& response, const Response& known, 
 }  // namespace
 
 /// Follows the model with its partials through all segments at fixed c, and hands [d y / d theta | y] of each channel and segment to `take`.
-template <class Take>
-void RunResidual::follow_partials(const VectorXd& theta, const VectorXd& linear, Take take) const {
+void RunResidual::follow_partials(const VectorXd& theta, const VectorXd& linear, const TakeRows& take) const {
   const LinearSystem system = differentiable_system(theta);
+  if (!system.feedback.empty()) return follow_nonlinear_partials(system, theta, linear, take);
   const ExactStep step = exact_step(system, run_->dt);
   const auto parameters = static_cast<Index>(model_->parameters().size());
   Response known;
@@ -302,17 +199,17 @@ void RunResidual::follow_partials(const VectorXd& theta, const VectorXd& linear,
     for (Index c = 0; c < measured_.cols(); ++c) {
       MatrixXd m = slopes_and_prediction(response, known, s, c, parameters);
       m.col(parameters).array() += linear[first_offset_ + c];
-      take(segment, s, c, std::move(m));
+      take(s, c, std::move(m));
     }
   }
 }
 
 RunResidual::Evaluation RunResidual::differentiate(const Solution& solution) const {
-  const Linearised& lin = *solution.model;
+  const Linearised& lin = solution.model->tangents ? *solution.model->tangents : *solution.model;
   const auto parameters = static_cast<Index>(model_->parameters().size());
   std::vector<MatrixXd> reached, others;
   std::size_t next = 0;
-  follow_partials(solution.theta, solution.linear, [&](const Segment&, const Interval& s, Index c, MatrixXd m) {
+  follow_partials(solution.theta, solution.linear, [&](const Interval& s, Index c, MatrixXd m) {
     // Residual and its derivative, weighted: [-d y / d theta | measured - y].
     m = -m;
     m.col(parameters) += measured_.col(c).segment(s.first, s.length());
@@ -360,12 +257,17 @@ RunResidual::Prediction RunResidual::predict(const VectorXd& theta) const {
   Prediction p;
   p.channels = channels_;
   p.linear = solution.linear;
-  p.linear_factor = lin.eliminate->factor();
+  p.linear_factor = (lin.tangents ? *lin.tangents : lin).eliminate->factor();
   p.offset = p.linear.segment(first_offset_, measured_.cols());
   p.initial_state = p.linear.segment(first_state_, static_cast<Index>(free_.size()));
   if (angle_offset_ >= 0) p.angle_offset = p.linear.segment(angle_offset_, 1);
   if (motion_.unknowns() > 0) p.motion = motion_of(motion_.coefficients(p.linear.head(motion_.unknowns())), run_->dt);
   p.output.resize(run_->samples(), measured_.cols());
+  if (!lin.system.feedback.empty()) {
+    p.output = follow(lin.system, lin.step, theta, {initial_state(p.linear, lin.system.states()), whole_jerk(p.linear), inputs_, MatrixXd(lin.system.states(), 0), {}}, run_->samples(), Partials::none).output;
+    p.output.rowwise() += p.offset.transpose();
+    return p;
+  }
   DualMatrix state(MatrixXd::Zero(lin.system.states(), 1));
   state.value.col(0) = initial_state(p.linear, lin.system.states());
   for (const Segment& segment : segments_) {
@@ -380,24 +282,38 @@ RunResidual::Prediction RunResidual::predict(const VectorXd& theta) const {
   return p;
 }
 
+/// d prediction / d c of one block, times what c does.
+MatrixXd RunResidual::prediction_slope(const Linearised& lin, std::size_t index, const MatrixXd& linear_slope) const {
+  const Linearised::Block& block = lin.blocks[index];
+  const Interval& s = block.samples;
+  const auto count = static_cast<Index>(free_.size());
+  MatrixXd slope;
+  if (block.rows.size() > 0) {
+    slope = block.moving ? MatrixXd(block.rows * linear_slope) : MatrixXd(block.rows * (block.start * linear_slope));
+    if (block.moving) return slope;  // the offset is among the columns
+  } else if (block.moving) {
+    slope = motion_output_columns(lin, block.channel, s) * linear_slope.topRows(motion_.unknowns());
+    if (count > 0)
+      slope += lin.free[static_cast<std::size_t>(block.channel)].topRows(s.length()) *
+               (segment_start(lin, s).middleCols(first_state_, count) * linear_slope.middleRows(first_state_, count));
+  } else {
+    slope = lin.free[static_cast<std::size_t>(block.channel)].topRows(s.length()) * (segment_start(lin, s) * linear_slope);
+  }
+  slope.rowwise() += linear_slope.row(first_offset_ + block.channel);
+  return slope;
+}
+
 RunResidual::Sensitivity RunResidual::sensitivity(const VectorXd& theta) const {
   const Solution solution = solve(theta);
-  const Linearised& lin = *solution.model;
+  const Linearised& lin = solution.model->tangents ? *solution.model->tangents : *solution.model;
   const Evaluation e = differentiate(solution);
   const auto parameters = static_cast<Index>(model_->parameters().size());
   const Index n = run_->samples();
   Sensitivity result;
   result.channels.assign(static_cast<std::size_t>(measured_.cols()), {VectorXd::Zero(n), MatrixXd::Zero(n, parameters)});
-  follow_partials(theta, solution.linear, [&](const Segment& segment, const Interval& s, Index c, MatrixXd m) {
-    // c follows theta: the motion through the states, the offset as it is.
-    MatrixXd follow = segment.moving ? MatrixXd(motion_output_columns(lin, c, s) * e.linear_slope.topRows(motion_.unknowns()))
-                                     : MatrixXd(lin.free[static_cast<std::size_t>(c)].topRows(s.length()) * (segment_start(lin, s) * e.linear_slope));
-    if (segment.moving && !free_.empty()) {
-      const auto count = static_cast<Index>(free_.size());
-      follow += lin.free[static_cast<std::size_t>(c)].topRows(s.length()) * (segment_start(lin, s).middleCols(first_state_, count) * e.linear_slope.middleRows(first_state_, count));
-    }
-    m.leftCols(parameters) += follow;
-    m.leftCols(parameters).rowwise() += e.linear_slope.row(first_offset_ + c);
+  std::size_t next = 0;
+  follow_partials(theta, solution.linear, [&](const Interval& s, Index c, MatrixXd m) {
+    m.leftCols(parameters) += prediction_slope(lin, next++, e.linear_slope);  // c follows theta
     m.col(parameters) = measured_.col(c).segment(s.first, s.length()) - m.col(parameters);
     const MatrixXd weighted = weight_.col(c).segment(s.first, s.length()).asDiagonal() * m;
     result.channels[static_cast<std::size_t>(c)].residual.segment(s.first, s.length()) = weighted.col(parameters);
@@ -418,7 +334,8 @@ MatrixXd RunResidual::linear_rows(const VectorXd& theta) const {
   free.set_motion_prior({});
   const Solution solution = free.solve(theta);
   MatrixXd rows(unknowns_, unknowns_ + 1);
-  const MatrixXd factor = solution.model->eliminate->factor();
+  const Linearised& lin = solution.model->tangents ? *solution.model->tangents : *solution.model;
+  const MatrixXd factor = lin.eliminate->factor();
   rows << factor, factor * solution.linear;
   return rows;
 }

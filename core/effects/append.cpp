@@ -1,5 +1,7 @@
 #include "core/effects/effect.h"
 
+#include <numbers>
+
 namespace unrig {
 namespace {
 
@@ -37,6 +39,74 @@ Index append_signal(LinearSystem& system, const DualMatrix& F, const std::vector
   system.A.set_block(0, first, push);
   system.C.set_block(0, first, direct);
   return first;
+}
+
+void append_strip_signal(LinearSystem& system, const EffectContext& c, const DualMatrix& F, const Eigen::RowVectorXd& read) {
+  std::vector<Index> strips;
+  for (Index s = 0; s < c.ports.strips; ++s) strips.push_back(c.ports.strip + s);
+  const MatrixXd spread = Eigen::VectorXd::Constant(c.ports.strips, 1.0 / static_cast<double>(c.ports.strips)) * read;
+  append_signal(system, F, strips, DualMatrix(spread, c.theta.size()));
+}
+
+void append_gauge_filter(LinearSystem& system, const EffectContext& c, const DualMatrix& F, const DualMatrix& g, const Eigen::RowVectorXd& h, double direct) {
+  const Index n = system.states(), k = F.rows(), inputs = system.B.cols(), row = c.gauge;
+  const DualMatrix bridge = system.C.block(row, 0, 1, n), bridge_inputs = system.D.block(row, 0, 1, inputs);
+  system.A = grown(system.A, n + k, n + k);
+  system.A.set_block(n, n, F);
+  system.A.set_block(n, 0, g * bridge);
+  system.B = grown(system.B, n + k, inputs);
+  if (inputs > 0) system.B.set_block(n, 0, g * bridge_inputs);
+  system.C = grown(system.C, system.C.rows(), n + k);
+  const auto put = [row](DualMatrix& whole, Index column, const DualMatrix& part) {
+    for (MatrixXd& p : whole.partial)
+      if (p.size() > 0) p.block(row, column, 1, part.cols()).setZero();
+    whole.set_block(row, column, part);
+  };
+  put(system.C, 0, direct * bridge);
+  put(system.C, n, DualMatrix(h));
+  if (inputs > 0) put(system.D, 0, direct * bridge_inputs);
+  for (Index i = 0; i < k; ++i) system.settling.push_back(n + i);
+}
+
+void append_feedback(LinearSystem& system, const DualMatrix& direction, Feedback feedback) {
+  for (DualMatrix* m : {&system.B, &system.D}) {
+    const DualMatrix push = *m * direction;
+    const Index columns = m->cols();
+    *m = grown(*m, m->rows(), columns + 1);
+    m->set_block(0, columns, push);
+  }
+  system.feedback.push_back(std::move(feedback));
+}
+
+Eigen::RowVectorXd first_mode(const AeroelasticModel& model, Index coordinates) {
+  const Rig& rig = model.rig();
+  const double shape = rig.is_modal() ? 1 : model.basis().normal((rig.calibration_element > 0 ? rig.calibration_element : 1) - 1, 0);
+  return shape * Eigen::RowVectorXd::Unit(coordinates, 0);
+}
+
+double first_mode_momentum(const AeroelasticModel& model) {
+  const Rig& rig = model.rig();
+  if (rig.is_modal()) return rig.modal.front().mass * 2 * std::numbers::pi * rig.modal.front().frequency;
+  const double shape = first_mode(model, 1)[0];
+  return model.basis().omega[0] / (shape * shape);
+}
+
+DualMatrix port(const LinearSystem& system, Index column, double amount) {
+  MatrixXd direction = MatrixXd::Zero(system.B.cols(), 1);
+  direction(column, 0) = amount;
+  return DualMatrix(direction, system.A.parameters());
+}
+
+Eigen::RowVectorXd displacement_of(const LinearSystem& system, const Eigen::RowVectorXd& shape) {
+  Eigen::RowVectorXd row = Eigen::RowVectorXd::Zero(system.states());
+  row.head(shape.size()) = shape;
+  return row;
+}
+
+Eigen::RowVectorXd rate_of(const LinearSystem& system, const Eigen::RowVectorXd& shape) {
+  Eigen::RowVectorXd row = Eigen::RowVectorXd::Zero(system.states());
+  row.segment(system.coordinates, shape.size()) = shape;
+  return row;
 }
 
 Index append_reading(LinearSystem& system, const DualMatrix& F, Index row, const DualMatrix& H) {

@@ -7,6 +7,16 @@
 
 namespace unrig {
 
+/// Input columns that an effect may push.
+struct Ports {
+  Eigen::Index force;        ///< [N] at the calibration element (modal rigs: on every mode)
+  Eigen::Index mount;        ///< velocity [m/s] of the mount, and behind it its acceleration [m/s^2]
+  Eigen::Index strip;        ///< first of `strips`: normal force on a strip [N]
+  Eigen::Index strips;
+  Eigen::Index coordinate;   ///< first of `coordinates`: generalised force
+  Eigen::Index coordinates;
+};
+
 /// What an effect may look at while it changes a system.
 struct EffectContext {
   const AeroelasticModel& model;
@@ -14,7 +24,7 @@ struct EffectContext {
   const Eigen::VectorXd& theta;
   Eigen::Index first_parameter;  ///< index into theta of the effect's first parameter
   Eigen::Index gauge;            ///< row of the gauge among the outputs, -1 where it is not among them
-  Eigen::Index strip_force;      ///< input column that pushes with one newton, spread evenly over the strips, in the direction of the normal force
+  Ports ports;
 
   double parameter(Eigen::Index k) const { return theta[first_parameter + k]; }
 };
@@ -30,9 +40,15 @@ struct Effect {
   std::vector<Parameter> parameters;  ///< names without the id
   /// Values from which a search should start, besides the parameters' own: one vector per start. The linear unknowns (amplitudes) follow by themselves.
   std::vector<Eigen::VectorXd> starts;
+  /// Of a nonlinear effect whose starts depend on the size of the response: from the largest argument that its law sees in the runs.
+  std::vector<Eigen::VectorXd> (*starts_for)(const AeroelasticModel&, double largest_argument) = nullptr;
+  /// Of an effect that is a steady tone: its frequency [Hz] in a run, for its parameters. A search then follows the lines of the residual's spectrum
+  /// through the bounds of the first parameter, in place of `starts`.
+  double (*frequency)(const AeroelasticModel&, const Conditions&, const Eigen::VectorXd& parameters) = nullptr;
   /// Whether it can act at all under these conditions.
-  bool (*acts)(const Conditions& conditions);
-  void (*apply)(LinearSystem& system, const EffectContext& context);
+  bool (*acts)(const Conditions& conditions) = nullptr;
+  void (*apply)(LinearSystem& system, const EffectContext& context) = nullptr;
+  bool on_modal_rigs = true;  ///< whether it makes sense for a rig that is known only as modes
 };
 
 /// All effects, in the order of formats.md.
@@ -44,7 +60,28 @@ const Effect& effect(const std::string& id);
 /// is unknown in every run. F is k x k, H is columns x k, both with partials over the model's parameters. Returns the index of the first new state.
 Eigen::Index append_signal(LinearSystem& system, const DualMatrix& F, const std::vector<Eigen::Index>& columns, const DualMatrix& H);
 
-/// The same for a signal that is simply added to output `row`.
+/// append_signal for a force that is spread evenly over the strips: `read` z newtons in all.
+void append_strip_signal(LinearSystem& system, const EffectContext& context, const DualMatrix& F, const Eigen::RowVectorXd& read);
+
+/// Puts a filter z' = F z + g y, y_f = h z + direct y between the bridge and the gauge's channel. It is at rest where the rig is, and in an unknown
+/// state where the run starts anyhow.
+void append_gauge_filter(LinearSystem& system, const EffectContext& context, const DualMatrix& F, const DualMatrix& g, const Eigen::RowVectorXd& h, double direct);
+
+/// A nonlinear force: f(z) times `direction` (ports x 1, over all input columns of `system`, with partials), z = sees x.
+void append_feedback(LinearSystem& system, const DualMatrix& direction, Feedback feedback);
+
+/// `amount` on input column `column`, as a direction for append_feedback.
+DualMatrix port(const LinearSystem& system, Eigen::Index column, double amount);
+/// What reads the displacement, or the rate, of a point that moves by `shape` times the coordinates.
+Eigen::RowVectorXd displacement_of(const LinearSystem& system, const Eigen::RowVectorXd& shape);
+Eigen::RowVectorXd rate_of(const LinearSystem& system, const Eigen::RowVectorXd& shape);
+
+/// The first normal mode as a row over the coordinates: what it displaces the element by that the dead weights hung at. Modal rigs: the first mode's coordinate itself.
+Eigen::RowVectorXd first_mode(const AeroelasticModel& model, Eigen::Index coordinates);
+/// Mass that moves there, times the mode's angular frequency [kg/s].
+double first_mode_momentum(const AeroelasticModel& model);
+
+/// As append_signal, for a signal that is simply added to output `row`.
 Eigen::Index append_reading(LinearSystem& system, const DualMatrix& F, Eigen::Index row, const DualMatrix& H);
 
 }  // namespace unrig

@@ -20,38 +20,14 @@ Effect gauge_lowpass() {
   e.acts = [](const Conditions&) { return true; };
   e.apply = [](LinearSystem& system, const EffectContext& c) {
     if (c.gauge < 0) return;
-    const Eigen::Index n = system.states(), m = system.B.cols(), parameters = c.theta.size(), p = c.first_parameter;
-    const double w = 2 * std::numbers::pi * c.parameter(0), zeta = c.parameter(1), per_hertz = 2 * std::numbers::pi;
-    // What the bridge sees drives the filter; the reading is the filter's first state.
-    const auto driven = [&](const DualMatrix& row) {
-      DualMatrix scaled = (w * w) * row;
-      scaled.partial.resize(static_cast<std::size_t>(parameters));
-      scaled.add_partial(p, 2 * w * per_hertz * row.value);
-      return scaled;
-    };
+    const Eigen::Index parameters = c.theta.size(), p = c.first_parameter;
+    const double per_hertz = 2 * std::numbers::pi, w = per_hertz * c.parameter(0), zeta = c.parameter(1);
     DualMatrix filter((Eigen::Matrix2d() << 0, 1, -w * w, -2 * zeta * w).finished(), parameters);
     filter.add_partial(p, (Eigen::Matrix2d() << 0, 0, -2 * w * per_hertz, -2 * zeta * per_hertz).finished());
     filter.add_partial(p + 1, (Eigen::Matrix2d() << 0, 0, 0, -2 * w).finished());
-
-    DualMatrix A(Eigen::MatrixXd::Zero(n + 2, n + 2), parameters), B(Eigen::MatrixXd::Zero(n + 2, m), parameters);
-    DualMatrix C(Eigen::MatrixXd::Zero(system.C.rows(), n + 2), parameters), D = system.D;
-    A.set_block(0, 0, system.A);
-    A.set_block(n, n, filter);
-    A.set_block(n + 1, 0, driven(system.C.block(c.gauge, 0, 1, n)));
-    B.set_block(0, 0, system.B);
-    if (m > 0) B.set_block(n + 1, 0, driven(system.D.block(c.gauge, 0, 1, m)));
-    C.set_block(0, 0, system.C);
-    for (DualMatrix* reading : {&C, &D}) {
-      reading->value.row(c.gauge).setZero();
-      for (Eigen::MatrixXd& partial : reading->partial)
-        if (partial.size() > 0) partial.row(c.gauge).setZero();
-    }
-    C.value(c.gauge, n) = 1;
-    system.A = A;
-    system.B = B;
-    system.C = C;
-    system.D = D;
-    system.settling = {n, n + 1};
+    DualMatrix drive(Eigen::Vector2d(0, w * w), parameters);
+    drive.add_partial(p, Eigen::Vector2d(0, 2 * w * per_hertz));
+    append_gauge_filter(system, c, filter, drive, Eigen::RowVector2d(1, 0), 0);
   };
   return e;
 }

@@ -4,10 +4,20 @@
 namespace unrig {
 
 // One function per file in core/effects/.
+Effect higher_mode();
+Effect cubic_stiffness();
+Effect coulomb_friction();
+Effect freeplay();
+Effect quadratic_drag();
+Effect wagner_lag();
+Effect separation_lag();
+Effect vortex_shedding();
 Effect tank_wave();
+Effect carriage_vibration();
 Effect gauge_lowpass();
 Effect torsion_crosstalk();
 Effect gauge_drift();
 Effect mains_hum();
+Effect channel_delay();
 
 }  // namespace unrig

@@ -7,11 +7,21 @@ namespace unrig {
 
 const std::vector<Effect>& effects() {
   static const std::vector<Effect> table{
+      higher_mode(),
+      cubic_stiffness(),
+      coulomb_friction(),
+      freeplay(),
+      quadratic_drag(),
+      wagner_lag(),
+      separation_lag(),
+      vortex_shedding(),
       tank_wave(),
+      carriage_vibration(),
       gauge_lowpass(),
       torsion_crosstalk(),
       gauge_drift(),
       mains_hum(),
+      channel_delay(),
   };
   return table;
 }

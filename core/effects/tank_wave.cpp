@@ -18,6 +18,7 @@ Effect tank_wave() {
   e.parameters = {{"frequency", "Hz", 0.5, 0.05, 5, false}, {"decay_time", "s", 8, 0.3, 1e3, false}};
   for (const double tau : {3.0, 12.0})
     for (double f = 0.15; f < 3; f *= 1.13) e.starts.push_back(Eigen::Vector2d(f, tau));
+  e.on_modal_rigs = false;
   e.acts = [](const Conditions& c) { return c.density > 100; };
   e.apply = [](LinearSystem& system, const EffectContext& c) {
     constexpr double pi = std::numbers::pi;
@@ -27,7 +28,7 @@ Effect tank_wave() {
     DualMatrix F((Eigen::Matrix2d() << -1 / tau, omega, -omega, -1 / tau).finished(), c.theta.size());
     F.add_partial(p, (Eigen::Matrix2d() << 0, 2 * pi, -2 * pi, 0).finished());
     F.add_partial(p + 1, Eigen::Matrix2d::Identity() / (tau * tau));
-    append_signal(system, F, {c.strip_force}, DualMatrix(Eigen::RowVector2d(1, 0), c.theta.size()));
+    append_strip_signal(system, c, F, Eigen::RowVector2d(1, 0));
   };
   return e;
 }

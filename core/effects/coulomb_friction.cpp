@@ -1,0 +1,43 @@
+#include <cmath>
+
+#include "core/effects/list.h"
+
+namespace unrig {
+
+namespace {
+
+/// -F tanh(v / v_s)
+double friction(double v, const double* p, double& slope, double* partial) {
+  const double t = std::tanh(v / p[1]), bell = 1 - t * t;
+  slope = -p[0] * bell / p[1];
+  partial[0] = -t;
+  partial[1] = p[0] * bell * v / (p[1] * p[1]);
+  return -p[0] * t;
+}
+
+}  // namespace
+
+/// Dry friction of the rig in its fundamental mode: F = -F_c tanh(v/v_s) on the coordinate of the first normal mode, scaled to the element that the dead weights hung at: v [m/s] is what
+/// that mode moves it by, and F_c [N] the sliding force there; below v_s [m/s] it does not slide fully. For a rig known only as modes, the first mode's coordinate.
+/// Source: C.-A. de Coulomb (1781); smoothed as in E. Pennestri et al., Nonlinear Dynamics 83 (2016) 1785.
+Effect coulomb_friction() {
+  Effect e;
+  e.id = "coulomb-friction";
+  e.summary = "dry friction in the rig";
+  e.equation = "F = -F_c tanh(v/v_s)";
+  e.source = "Coulomb (1781); Pennestri et al., Nonlinear Dynamics 83 (2016) 1785";
+  e.parameters = {{"force", "N", 0, 0, 1e4, false}, {"velocity", "m/s", 1e-3, 1e-6, 1, false}};
+  e.starts = {Eigen::Vector2d(0.1, 1e-3)};
+  e.starts_for = [](const AeroelasticModel& model, double fastest) -> std::vector<Eigen::VectorXd> {  // as much as a damping ratio near 0.01
+    const double momentum = first_mode_momentum(model);
+    return {Eigen::Vector2d(0.01 * momentum * fastest, 0.02 * fastest), Eigen::Vector2d(0.01 * momentum * fastest, 0.002 * fastest)};
+  };
+  e.acts = [](const Conditions&) { return true; };
+  e.apply = [](LinearSystem& system, const EffectContext& c) {
+    const Eigen::RowVectorXd shape = first_mode(c.model, system.coordinates);
+    append_feedback(system, port(system, c.ports.coordinate, shape[0]), {rate_of(system, shape), c.first_parameter, 2, friction});
+  };
+  return e;
+}
+
+}  // namespace unrig

@@ -1,0 +1,38 @@
+#include "core/effects/list.h"
+
+namespace unrig {
+
+namespace {
+
+/// -k_3 ((z + d)^3 - d^3)
+double cubic(double z, const double* p, double& slope, double* partial) {
+  const double k = p[0], d = p[1], shape = z * (z * z + 3 * z * d + 3 * d * d);
+  slope = -k * 3 * (z + d) * (z + d);
+  partial[0] = -shape;
+  partial[1] = -k * 3 * z * (z + 2 * d);
+  return -k * shape;
+}
+
+}  // namespace
+
+/// Stiffness of the fundamental mode that changes with amplitude: F = -k_3 ((h + d)^3 - d^3) on the coordinate of the first normal mode, scaled to the element that the dead weights
+/// hung at: h [m] is what that mode displaces it by from where it stood before the run, d how far that was from the unloaded position [m], of each run in a
+/// stream; k_3 [N/m^3], negative where the rig softens. For a rig known only as modes, the first mode's coordinate.
+/// Source: G. Duffing, Erzwungene Schwingungen (1918).
+Effect cubic_stiffness() {
+  Effect e;
+  e.id = "cubic-stiffness";
+  e.summary = "stiffness that changes with amplitude";
+  e.equation = "F = -k_3 ((h + d)^3 - d^3)";
+  e.source = "Duffing, Erzwungene Schwingungen (1918)";
+  e.parameters = {{"coefficient", "N/m^3", 0, -1e12, 1e12, false}, {"static_displacement", "m", 0, -1, 1, true}};
+  e.starts = {Eigen::Vector2d(0, 0)};
+  e.acts = [](const Conditions&) { return true; };
+  e.apply = [](LinearSystem& system, const EffectContext& c) {
+    const Eigen::RowVectorXd shape = first_mode(c.model, system.coordinates);
+    append_feedback(system, port(system, c.ports.coordinate, shape[0]), {displacement_of(system, shape), c.first_parameter, 2, cubic});
+  };
+  return e;
+}
+
+}  // namespace unrig

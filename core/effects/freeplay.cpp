@@ -1,0 +1,49 @@
+#include <algorithm>
+#include <cmath>
+
+#include "core/effects/list.h"
+
+namespace unrig {
+
+namespace {
+
+/// What the gap takes from the deflection: z within it, the gap beyond.
+double gap(double z, const double* p, double& slope, double* partial) {
+  const bool inside = std::abs(z) < p[0];
+  slope = inside ? 1 : 0;
+  partial[0] = inside ? 0 : (z > 0 ? 1 : -1);
+  return std::clamp(z, -p[0], p[0]);
+}
+
+}  // namespace
+
+/// A gap in the torsional drive: the elastic couple acts on the twist beyond the gap only, M = -k (theta - clamp(theta, -delta, delta)), theta the elastic twist [rad] of
+/// the section in the first torsional mode, delta half the gap [rad], k that mode's stiffness. The gap is centred where the rig stood before the run.
+/// Source: E. H. Dowell et al., A Modern Course in Aeroelasticity (2015), chapter 11.
+Effect freeplay() {
+  Effect e;
+  e.id = "freeplay";
+  e.summary = "backlash, a gap in the torsional drive";
+  e.equation = "M = -k (theta - clamp(theta, -delta, delta))";
+  e.source = "Dowell et al., A Modern Course in Aeroelasticity (2015), chapter 11";
+  e.parameters = {{"half_gap", "rad", 0, 0, 0.5, false}};
+  e.starts = {Eigen::VectorXd::Constant(1, 1e-3)};
+  e.starts_for = [](const AeroelasticModel&, double widest) -> std::vector<Eigen::VectorXd> { return {Eigen::VectorXd::Constant(1, 0.05 * widest), Eigen::VectorXd::Constant(1, 0.3 * widest)}; };
+  e.acts = [](const Conditions&) { return true; };
+  e.on_modal_rigs = false;
+  e.apply = [](LinearSystem& system, const EffectContext& c) {
+    const Rig& rig = c.model.rig();
+    const Basis& basis = c.model.basis();
+    if (basis.torsion_modes < 1) return;
+    const Eigen::Index first = basis.normal_modes, stiffness = c.model.index("torsion.stiffness_scale");
+    const double shape = basis.twist(rig.submerged.back() - 1, first), omega = basis.omega[first];
+    DualMatrix direction = port(system, c.ports.coordinate + first, c.theta[stiffness] * omega * omega / shape);
+    direction.add_partial(stiffness, port(system, c.ports.coordinate + first, omega * omega / shape).value);
+    Eigen::RowVectorXd twist = Eigen::RowVectorXd::Zero(system.coordinates);
+    twist[first] = shape;
+    append_feedback(system, direction, {displacement_of(system, twist), c.first_parameter, 1, gap});
+  };
+  return e;
+}
+
+}  // namespace unrig

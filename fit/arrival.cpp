@@ -1,0 +1,327 @@
+#include "fit/arrival.h"
+
+#include <algorithm>
+#include <cmath>
+#include <complex>
+#include <limits>
+#include <numbers>
+#include <optional>
+
+#include <fmt/format.h>
+
+#include "core/effects/effect.h"
+#include "fit/first_guess.h"
+#include "fit/undetermined.h"
+
+namespace unrig {
+namespace {
+
+using Eigen::Index;
+using Eigen::VectorXd;
+using Windows = std::vector<std::vector<MotionBasis::Window>>;
+
+void tell(const FitProblem& problem, const std::string& what) {
+  if (problem.progress) problem.progress(what);
+}
+
+JointProblem make_joint(const AeroelasticModel& model, const std::vector<Run>& runs, const Windows& windows, Index horizon) {
+  std::vector<RunResidual> residuals;
+  for (std::size_t r = 0; r < runs.size(); ++r) residuals.emplace_back(model, runs[r], windows[r], RunOptions{horizon});
+  return JointProblem(model, std::move(residuals));
+}
+
+/// Continues `next` from the values of `last`.
+void carry_over(const JointProblem& last, JointProblem& next) {
+  for (Unknown& u : next.unknowns())
+    for (const Unknown& known : last.unknowns())
+      if (u.parameter == known.parameter && u.run == known.run) u = known;
+  for (std::size_t r = 0; r < next.runs().size(); ++r) next.runs()[r].start_from(last.runs()[r]);
+}
+
+/// Horizons of the growing window, in samples; the last, 0, is the whole record.
+std::vector<Index> growing_horizons(const std::vector<Run>& runs) {
+  Index longest = 0;
+  for (const Run& run : runs) longest = std::max(longest, run.samples());
+  constexpr Index shortest = 40, growth = 8;
+  std::vector<Index> horizons{0};
+  for (Index horizon = longest / growth; horizon >= shortest; horizon /= growth) horizons.insert(horizons.begin(), horizon);
+  return horizons;
+}
+
+/// Follows the growing window through the stages [first, last) from the values of the joint fit.
+void follow(Arrival& arrival, const FitProblem& problem, const std::vector<Index>& horizons, std::size_t first, std::size_t last, int iterations) {
+  for (std::size_t stage = first; stage < last; ++stage) {
+    JointProblem longer = make_joint(*arrival.model, problem.runs, arrival.windows, horizons[stage]);
+    carry_over(arrival.joint, longer);
+    arrival.joint = std::move(longer);
+    const bool whole = horizons[stage] == 0;
+    tell(problem, whole ? "fitting the whole record" : fmt::format("fitting the first {} samples", horizons[stage]));
+    JointProblem::SolveOptions options;
+    options.prior = !whole;
+    options.tolerance = whole ? 1e-7 : 1e-2;
+    options.iterations = whole ? iterations : 12;
+    solve(arrival, options);
+  }
+}
+
+constexpr double explained = 2;  // reduced chi-square of a record that a model can be said to follow
+
+/// Once more from stiffnesses around the first guess; the best after the early stages goes on.
+Arrival try_other_starts(const Arrival& start, const FitProblem& problem, const std::vector<Index>& horizons, int iterations) {
+  const std::size_t early = std::min<std::size_t>(2, horizons.size() - 1);
+  std::optional<Arrival> best;
+  double least = std::numeric_limits<double>::infinity();
+  for (const double torsion : {0.5, 1.0, 2.0})
+    for (const double normal : {0.5, 1.0, 2.0}) {
+      if (torsion == 1 && normal == 1) continue;
+      Arrival other = start;
+      for (Unknown& u : other.joint.unknowns()) {
+        const std::string& name = other.joint.parameter(u).name;
+        if (u.held || name.find("stiffness") == std::string::npos) continue;
+        u.value = std::clamp(u.value * (name.starts_with("torsion") ? torsion : normal), other.joint.parameter(u).lower, other.joint.parameter(u).upper);
+      }
+      tell(problem, "trying other starts");
+      follow(other, problem, horizons, 0, early, iterations);
+      if (const double chi2 = other.joint.chi2(); chi2 < least || !best) {
+        least = chi2;
+        best = other;
+      }
+    }
+  follow(*best, problem, horizons, early, horizons.size(), iterations);
+  return *best;
+}
+
+/// All the way from the values in `start`.
+Arrival grow(Arrival start, const FitProblem& problem, const ArrivalEffort& effort) {
+  const std::vector<Index> horizons = growing_horizons(problem.runs);
+  Arrival arrival = start;
+  follow(arrival, problem, horizons, 0, horizons.size(), effort.iterations);
+  if (!effort.other_starts || horizons.size() < 2 || arrival.reduced_chi2() < explained) return arrival;
+  Arrival other = try_other_starts(start, problem, horizons, effort.iterations);
+  return other.reduced_chi2() < arrival.reduced_chi2() ? other : arrival;
+}
+
+void set_starts(JointProblem& joint, const std::map<std::string, double>& starts) {
+  for (Unknown& u : joint.unknowns())
+    if (const auto found = starts.find(joint.parameter(u).name); found != starts.end()) u.value = found->second;
+}
+
+Arrival first_guess(const FitProblem& problem, const std::shared_ptr<const AeroelasticModel>& model, const Windows& windows, const std::map<std::string, double>& starts) {
+  Arrival start{model, windows, make_joint(*model, problem.runs, windows, growing_horizons(problem.runs).front())};
+  set_starts(start.joint, starts);
+  hold_undetermined(start.joint);
+  guess_from_spectra(start.joint);
+  return start;
+}
+
+/// Power of what a fit leaves of the gauge in each run, over the power of white noise with its variance, as a function of frequency.
+class ResidualLines {
+ public:
+  explicit ResidualLines(const JointProblem& joint) {
+    for (std::size_t r = 0; r < joint.runs().size(); ++r) {
+      const RunResidual& run = joint.runs()[r];
+      const RunResidual::Prediction p = run.predict(joint.theta(r));
+      VectorXd left = run.run().channel(p.channels.front()).value - p.output.col(0);
+      for (Index k = 0; k < left.size(); ++k)
+        if (!(run.channel_weight(0)[k] > 0) || !std::isfinite(left[k])) left[k] = 0;
+      dt_.push_back(run.run().dt);
+      left_.push_back(left / std::max(1e-300, std::sqrt(left.squaredNorm() / static_cast<double>(left.size()))));
+    }
+  }
+  double power(std::size_t run, double frequency) const {
+    if (!(frequency > 0) || frequency > 0.5 / dt_[run]) return 0;
+    const std::complex<double> turn = std::polar(1.0, -2 * std::numbers::pi * frequency * dt_[run]);
+    std::complex<double> sum = 0, phase = 1;
+    for (const double x : left_[run]) sum += x * phase, phase *= turn;
+    return std::norm(sum) / static_cast<double>(left_[run].size());
+  }
+  double resolution(std::size_t run) const { return 1 / (dt_[run] * static_cast<double>(left_[run].size())); }
+
+ private:
+  std::vector<VectorXd> left_;
+  std::vector<double> dt_;
+};
+
+/// Starts of a steady tone: where the lines of the residual's spectra, followed through the bounds of its first parameter, add up to most.
+std::vector<VectorXd> tone_starts(const JointProblem& joint, const Effect& e) {
+  const ResidualLines lines(joint);
+  VectorXd p(static_cast<Index>(e.parameters.size()));
+  for (Index k = 0; k < p.size(); ++k) p[k] = e.parameters[static_cast<std::size_t>(k)].start;
+  std::vector<std::pair<double, double>> found;  // power, parameter
+  const double lower = e.parameters[0].lower, upper = e.parameters[0].upper;
+  for (p[0] = lower; p[0] < upper;) {
+    double power = 0, finest = upper - lower;
+    for (std::size_t r = 0; r < joint.runs().size(); ++r) {
+      const Conditions& c = joint.runs()[r].conditions();
+      if (!e.acts(c)) continue;
+      const double f = e.frequency(joint.model(), c, p);
+      power += lines.power(r, f);
+      finest = std::min(finest, 0.3 * lines.resolution(r) * p[0] / f);
+    }
+    found.emplace_back(power, p[0]);
+    p[0] += finest;
+  }
+  std::sort(found.rbegin(), found.rend());
+  std::vector<VectorXd> starts;
+  constexpr std::size_t most = 3;
+  for (const auto& [power, value] : found) {
+    p[0] = value;
+    const bool near_another = std::any_of(starts.begin(), starts.end(), [&](const VectorXd& s) { return std::abs(s[0] - value) < 0.05 * value; });
+    if (!near_another) starts.push_back(p);
+    if (starts.size() == most) break;
+  }
+  return starts;
+}
+
+std::vector<VectorXd> starts_of(JointProblem& joint, const Effect& e) {
+  if (e.frequency) return tone_starts(joint, e);
+  if (!e.starts_for) return e.starts;
+  double largest = 0;
+  for (std::size_t r = 0; r < joint.runs().size(); ++r)
+    if (const VectorXd seen = joint.runs()[r].largest_arguments(joint.theta(r)); seen.size() > 0) largest = std::max(largest, seen.maxCoeff());
+  return largest > 0 ? e.starts_for(joint.model(), largest) : e.starts;
+}
+
+/// The best of each effect's starts, by chi-square with the linear unknowns following; never none of it, from where it may have no slope.
+void choose_effect_starts(Arrival& arrival, const FitProblem& problem, const std::vector<std::string>& added) {
+  for (const std::string& id : added) {
+    tell(problem, "looking for " + id);
+    const std::vector<Unknown*> own = unknowns_of(arrival.joint, id);
+    const auto& parameters = effect(id).parameters;
+    const auto set = [&](const VectorXd& values) {
+      for (Unknown* u : own)
+        for (std::size_t k = 0; k < parameters.size(); ++k)
+          if (arrival.joint.parameter(*u).name == id + "." + parameters[k].name) u->value = values[static_cast<Index>(k)];
+    };
+    const std::vector<VectorXd> starts = starts_of(arrival.joint, effect(id));
+    const VectorXd* best = nullptr;
+    double least = std::numeric_limits<double>::infinity();
+    for (const VectorXd& start : starts) {
+      set(start);
+      const double chi2 = starts.size() > 1 ? arrival.joint.chi2() : 0;
+      if (chi2 < least || !best) best = &start;
+      least = std::min(least, chi2);
+    }
+    if (best) set(*best);
+  }
+  set_starts(arrival.joint, problem.start);
+}
+
+/// Widens a window of the motion where the gauge still sees the shaft move beyond it: chi-square must fall by clearly more than the knots added.
+bool widen_motion(JointProblem& joint, const std::vector<Run>& runs, Windows& windows) {
+  bool widened = false;
+  for (std::size_t r = 0; r < runs.size(); ++r) {
+    double before = -1;  // chi-square with the present windows, once it is known
+    for (std::size_t w = 0; w < windows[r].size(); ++w) {
+      const Interval knots = windows[r][w].knots;
+      const Index more = std::max<Index>(10, knots.length() / 4);
+      for (const bool later : {true, false}) {
+        std::vector<MotionBasis::Window> trial = windows[r];
+        Interval& k = trial[w].knots;
+        if (later)
+          k.last = std::min(w + 1 < trial.size() ? trial[w + 1].knots.first - 5 : runs[r].samples() - 5, k.last + more);
+        else
+          k.first = std::max<Index>(w > 0 ? trial[w - 1].knots.last + 5 : 0, k.first - more);
+        const auto added = static_cast<double>(k.length() - windows[r][w].knots.length());
+        if (added <= 0) continue;
+        RunResidual wider = joint.runs()[r].with_motion(trial);
+        const VectorXd theta = joint.theta(r);
+        wider.reject_spikes(theta);
+        if (!(before >= 0)) before = joint.runs()[r].solve(theta).chi2;
+        const double scale = std::max(1.0, before / static_cast<double>(joint.runs()[r].degrees_of_freedom()));
+        const double gain = (before - wider.solve(theta).chi2) / scale;
+        if (gain < added + 4 * std::sqrt(2 * added)) continue;  // four standard deviations of chi-square with that many degrees
+        windows[r] = trial;
+        joint.runs()[r] = std::move(wider);
+        before = -1;
+        widened = true;
+      }
+    }
+  }
+  return widened;
+}
+
+}  // namespace
+
+double Arrival::reduced_chi2() const {
+  double freedom = 0;
+  for (const RunResidual& run : joint.runs()) freedom += static_cast<double>(run.degrees_of_freedom());
+  return joint.chi2() / freedom;
+}
+
+std::vector<Unknown*> unknowns_of(JointProblem& joint, const std::string& id) {
+  std::vector<Unknown*> own;
+  for (Unknown& u : joint.unknowns())
+    if (joint.parameter(u).name.starts_with(id + ".")) own.push_back(&u);
+  return own;
+}
+
+void solve(Arrival& arrival, const JointProblem::SolveOptions& options) {
+  const JointProblem::Summary summary = arrival.joint.solve(options);
+  arrival.evaluations += summary.evaluations;
+  arrival.converged = summary.converged;
+  arrival.message = summary.message;
+}
+
+Arrival arrive(const FitProblem& problem, const std::shared_ptr<const AeroelasticModel>& model, const ArrivalEffort& effort) {
+  Windows windows;
+  for (const Run& run : problem.runs) windows.push_back(problem.rig.is_modal() ? std::vector<MotionBasis::Window>{} : motion_windows(run));
+  Arrival arrival = grow(first_guess(problem, model, windows, problem.start), problem, effort);
+  hold_undetermined(arrival.joint);
+  return arrival;
+}
+
+Arrival extend(const FitProblem& problem, const Arrival& without, const std::shared_ptr<const AeroelasticModel>& model, const std::vector<std::string>& added) {
+  Arrival arrival{model, without.windows, make_joint(*model, problem.runs, without.windows, 0)};
+  for (const Unknown& known : without.joint.unknowns()) {
+    const std::string& name = without.joint.parameter(known).name;
+    for (Unknown& u : arrival.joint.unknowns())
+      if (u.run == known.run && arrival.joint.parameter(u).name == name) u.value = known.value;
+  }
+  for (std::size_t r = 0; r < arrival.joint.runs().size(); ++r) {
+    arrival.joint.runs()[r].keep_noise_of(without.joint.runs()[r]);
+    arrival.joint.runs()[r].start_from(without.joint.runs()[r]);
+  }
+  choose_effect_starts(arrival, problem, added);
+  hold_undetermined(arrival.joint);
+  return arrival;
+}
+
+Arrival arrive_with_effects(const FitProblem& problem, const Arrival& like, const ArrivalEffort& effort) {
+  std::map<std::string, double> starts = problem.start;
+  for (const Unknown& u : like.joint.unknowns())
+    if (const std::string& name = like.joint.parameter(u).name; name.find('-') != std::string::npos) starts.emplace(name, u.value);  // only effects have a dash
+  Arrival arrival = grow(first_guess(problem, like.model, like.windows, starts), problem, effort);
+  hold_undetermined(arrival.joint);
+  return arrival;
+}
+
+Arrival go_on_with_effects(const FitProblem& problem, const Arrival& without, const std::shared_ptr<const AeroelasticModel>& model, const ArrivalEffort& effort) {
+  const Arrival chosen = extend(problem, without, model, problem.effects);
+  Arrival arrival = chosen;
+  JointProblem::SolveOptions options;
+  options.iterations = effort.iterations;
+  solve(arrival, options);
+  if (arrival.reduced_chi2() < explained) return arrival;
+  // Without the effects the rig's parameters may have gone far astray.
+  Arrival other = arrive_with_effects(problem, chosen, effort);
+  other.evaluations += arrival.evaluations;
+  return other.reduced_chi2() < arrival.reduced_chi2() ? other : arrival;
+}
+
+void refine(Arrival& arrival, const FitProblem& problem) {
+  JointProblem& joint = arrival.joint;
+  for (std::size_t r = 0; r < joint.runs().size(); ++r) joint.runs()[r].settle_noise(joint.theta(r));
+  constexpr int rounds = 4;
+  for (int round = 0; round < rounds; ++round) {
+    Index rejected = 0;
+    for (std::size_t r = 0; r < joint.runs().size(); ++r) rejected += joint.runs()[r].reject_spikes(joint.theta(r));
+    const bool changed = widen_motion(joint, problem.runs, arrival.windows) || rejected > 0;
+    if (!changed && round > 0) break;
+    tell(problem, "refining the motion");
+    solve(arrival);  // the first time for the noise levels' sake
+    if (!changed) break;
+  }
+}
+
+}  // namespace unrig

@@ -1,0 +1,54 @@
+#pragma once
+#include <functional>
+#include <map>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "core/aeroelastic_model.h"
+#include "fit/fit.h"
+#include "fit/joint_problem.h"
+
+namespace unrig {
+
+/// A joint fit on its way from first guesses to the least chi-square.
+struct Arrival {
+  std::shared_ptr<const AeroelasticModel> model;
+  std::vector<std::vector<MotionBasis::Window>> windows;  ///< of the motion, per run
+  JointProblem joint;
+  int evaluations = 0;
+  bool converged = false;
+  std::string message = {};
+
+  double reduced_chi2() const;
+};
+
+/// How much work an arrival is worth.
+struct ArrivalEffort {
+  bool other_starts = true;  ///< where the record stays unexplained, once more from stiffnesses around the first guess
+  int iterations = 50;       ///< over the whole record
+};
+
+/// From the problem's start values to the whole record by way of windows that grow from a few periods. The effects of the problem are left out.
+Arrival arrive(const FitProblem& problem, const std::shared_ptr<const AeroelasticModel>& model, const ArrivalEffort& effort = {});
+
+/// The fit goes on with effects at work, `model` being the one with them: from the best of the effects' starts. Where the values of the fit without them do not
+/// lead there, all over again with the effects from the first window on.
+Arrival go_on_with_effects(const FitProblem& problem, const Arrival& without, const std::shared_ptr<const AeroelasticModel>& model, const ArrivalEffort& effort = {});
+
+/// The same with `model` and nothing searched for yet: values of the fit `without` it where it has them, the best of their starts for the effects `added`.
+Arrival extend(const FitProblem& problem, const Arrival& without, const std::shared_ptr<const AeroelasticModel>& model, const std::vector<std::string>& added);
+
+/// All the way from first guesses with the effects of `model` at work from the first window on; those start from the values that `like` has for them.
+Arrival arrive_with_effects(const FitProblem& problem, const Arrival& like, const ArrivalEffort& effort = {});
+
+/// Searches the least chi-square from where the fit stands.
+void solve(Arrival& arrival, const JointProblem::SolveOptions& options = {});
+
+/// Noise levels from what the model leaves, spikes, and windows of the motion that the gauge asks to be wider; solves again after each.
+void refine(Arrival& arrival, const FitProblem& problem);
+
+/// The unknowns that belong to effect `id`.
+std::vector<Unknown*> unknowns_of(JointProblem& joint, const std::string& id);
+
+}  // namespace unrig

@@ -1,0 +1,73 @@
+#pragma once
+#include <array>
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "core/rig.h"
+#include "core/run.h"
+#include "core/wagner.h"
+#include "fit/diagnose/mismatch.h"
+#include "fit/fit.h"
+
+namespace unrig {
+
+/// Where do these recordings and the model of their rig differ, and which physics was left out?
+struct DiagnoseProblem {
+  Rig rig;
+  std::vector<Run> runs;
+  std::vector<Run> heldout;           ///< not fitted; predicted, with their own motion, initial state and lift slope
+  Wagner circulation = Wagner::within_1e4;
+  std::vector<std::string> effects;   ///< candidates; empty: all that can act in these runs
+  int threads = 2;
+  std::function<void(const std::string&)> progress;
+};
+
+/// A set of effects that was tried.
+struct Candidate {
+  std::vector<std::string> effects;
+  double reduced_chi2 = 0;   ///< of the fitted runs, after the fit
+  double delta_bic = 0;      ///< against the fit with nothing missing; negative is better
+  double probability = 0;    ///< exp(-BIC/2) over the sum of it over all sets tried
+  double score = 0;          ///< share of the excess of chi-square that one linear step promised to remove (first round only)
+};
+
+struct MissingEffect {
+  std::string effect;
+  double probability = 0;
+  std::string equation, source;
+  std::vector<FittedParameter> parameters;
+};
+
+/// One run before and after the effects that were found; residuals of its first fitted channel.
+struct ImprovedRun {
+  std::string file, unit;
+  bool heldout = false;
+  double rms_before = 0, rms_after = 0, noise = 0;
+};
+
+struct Diagnosis {
+  Mismatch mismatch;                   ///< of the best fit with nothing missing
+  std::vector<MissingEffect> missing;  ///< the winner
+  std::vector<std::vector<std::string>> equivalent;  ///< sets that these runs cannot tell from the winner
+  bool unexplained = false;            ///< a significant mismatch remains
+  Mismatch remaining;                  ///< and where it sits
+  double bic_before = 0, bic_after = 0;
+  std::vector<ImprovedRun> runs;
+  std::vector<Candidate> ranking;
+  FitResult before, after;
+  double seconds = 0;
+};
+
+/// 1. The best fit with nothing missing, runs that it cannot explain weighted down; its residual is tested for energy and colour.
+/// 2. Every candidate is linearised there: how much of the residual could one step in its parameters and the rig's remove?
+/// 3. The promising ones are fitted in full, everything free, while the weights return to those of the noise. They are compared by BIC with each run's
+///    own variance and with as many samples as the remaining colour leaves independent.
+/// 4. While a mismatch remains a further effect is tried beside the best; an effect that others made superfluous is taken away again.
+/// An effect is named only where the set it belongs to leaves nothing (reduced chi-square near one), or nearly all of the excess is gone; otherwise the mismatch is
+/// unexplained.
+///
+/// Throws InputError where a run does not belong to the rig.
+Diagnosis diagnose(const DiagnoseProblem& problem);
+
+}  // namespace unrig

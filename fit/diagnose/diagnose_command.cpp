@@ -1,0 +1,53 @@
+#include "fit/diagnose/diagnose_command.h"
+
+#include <CLI/CLI.hpp>
+#include <fmt/format.h>
+
+#include "core/command.h"
+#include "core/effects/effect.h"
+#include "core/text_file.h"
+#include "fit/diagnose/diagnose.h"
+#include "fit/diagnose/diagnosis_files.h"
+#include "fit/fit_files.h"
+
+namespace unrig {
+
+int diagnose_command(int argc, char** argv) {
+  DiagnoseProblem problem;
+  CLI::App app{"Says where recordings and the model of their rig differ, and which physics was left out.", "unrig diagnose"};
+  std::string rig, output, fit_output;
+  std::vector<std::string> runs, heldout, ids;
+  app.add_option("--rig", rig, "rig file (TOML)")->required();
+  app.add_option("runs", runs, "run files (CSV) of this rig, in any number")->required();
+  app.add_option("--heldout", heldout, "run that is not fitted but predicted (repeatable)");
+  app.add_option("--effects", ids, "candidates, separated by commas; without it, all that can act in these runs")->delimiter(',');
+  app.add_option("--threads", problem.threads, "candidates that are fitted at the same time")->capture_default_str()->check(CLI::Range(1, 256));
+  app.add_option("--fit", fit_output, "writes the winning fit too (fit.json), for simulate and correct");
+  app.add_option("-o,--output", output, "result (JSON)")->required();
+  app.footer("Example:\n  unrig diagnose --rig rig.toml dry_pluck.csv wet_pluck.csv step_a.csv step_b.csv --heldout step_c.csv -o diagnosis.json");
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& e) {
+    return app.exit(e) == 0 ? exit_done : exit_wrong_use;
+  }
+  problem.rig = read_rig(rig);
+  for (const std::string& path : runs) problem.runs.push_back(read_run(path));
+  for (const std::string& path : heldout) problem.heldout.push_back(read_run(path));
+  try {
+    for (const std::string& id : ids) problem.effects.push_back(effect(id).id);
+  } catch (const std::invalid_argument& e) {
+    throw InputError({"--effects", 0}, e.what(), "wanted some of these", "");
+  }
+  Progress progress;
+  problem.progress = [&](const std::string& what) { progress(what); };
+  const Diagnosis diagnosis = diagnose(problem);
+  progress.clear();
+  for (const std::string& warning : problem.rig.warnings) warn(warning);
+  write_text(output, to_json(diagnosis));
+  if (!fit_output.empty()) write_text(fit_output, to_json(diagnosis.after));
+  fmt::print("{}", report(diagnosis));
+  fmt::print("    {:.1f} s\n", diagnosis.seconds);
+  return diagnosis.unexplained ? exit_no_answer : exit_done;
+}
+
+}  // namespace unrig

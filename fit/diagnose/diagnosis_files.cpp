@@ -1,0 +1,91 @@
+#include "fit/diagnose/diagnosis_files.h"
+
+#include <cmath>
+#include <filesystem>
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+#include <nlohmann/json.hpp>
+
+#include "fit/fit_files.h"
+
+namespace unrig {
+namespace {
+
+using nlohmann::ordered_json;
+
+ordered_json number(double x) { return std::isfinite(x) ? ordered_json(x) : ordered_json(nullptr); }
+
+ordered_json mismatch_json(const Mismatch& m) {
+  ordered_json channels = ordered_json::array();
+  for (const ChannelMismatch& c : m.channels) channels.push_back({{"run", c.run}, {"channel", c.channel}, {"power_over_noise", number(c.energy)}, {"p_value", number(c.p_value)}});
+  return {{"found", m.found}, {"p_value", number(m.p_value)}, {"runs", m.runs}, {"time", m.time}, {"frequency", m.frequency}, {"summary", m.summary}, {"channels", channels}};
+}
+
+std::string set_name(const std::vector<std::string>& effects) { return effects.empty() ? "nothing missing" : fmt::format("{}", fmt::join(effects, " + ")); }
+
+std::string verdict(const Diagnosis& d) {
+  if (!d.mismatch.found) return "Nothing is missing: " + d.mismatch.summary + ".";
+  if (d.missing.empty()) return "There is a mismatch that no known effect removes: unexplained.";
+  std::vector<std::string> ids;
+  for (const MissingEffect& m : d.missing) ids.push_back(m.effect);
+  return fmt::format("Missing is {}{}.", fmt::join(ids, " and "), d.unexplained ? "; something remains unexplained" : "");
+}
+
+}  // namespace
+
+std::string to_json(const Diagnosis& d) {
+  ordered_json missing = ordered_json::array(), runs = ordered_json::array(), ranking = ordered_json::array();
+  for (const MissingEffect& m : d.missing) {
+    ordered_json parameters = ordered_json::array();
+    for (const FittedParameter& p : m.parameters) {
+      ordered_json one = {{"name", p.name}, {"value", number(p.value)}, {"std_error", number(p.std_error)}, {"unit", p.unit}};
+      if (!p.run.empty()) one["run"] = p.run;
+      parameters.push_back(one);
+    }
+    missing.push_back({{"effect", m.effect}, {"probability", number(m.probability)}, {"equation", m.equation}, {"source", m.source}, {"parameters", parameters}});
+  }
+  for (const ImprovedRun& r : d.runs)
+    runs.push_back({{"file", r.file}, {"heldout", r.heldout}, {"rms_before", number(r.rms_before)}, {"rms_after", number(r.rms_after)}, {"noise", number(r.noise)}, {"unit", r.unit}});
+  for (const Candidate& c : d.ranking)
+    ranking.push_back({{"effect", set_name(c.effects)}, {"score", number(c.score)}, {"reduced_chi2", number(c.reduced_chi2)}, {"delta_bic", number(c.delta_bic)}, {"probability", number(c.probability)}});
+  ordered_json shifts = ordered_json::array();
+  for (const FittedParameter& b : d.before.parameters)
+    for (const FittedParameter& a : d.after.parameters)
+      if (!d.after.effects.empty() && a.name == b.name && a.run == b.run && a.identified)
+        shifts.push_back({{"name", a.name}, {"run", a.run}, {"without", number(b.value)}, {"with", number(a.value)}, {"std_error", number(a.std_error)}, {"unit", a.unit}});
+  const ordered_json json = {{"unrig", "diagnosis"},
+                             {"verdict", verdict(d)},
+                             {"mismatch", mismatch_json(d.mismatch)},
+                             {"missing", missing},
+                             {"equivalent", d.equivalent},
+                             {"unexplained", d.unexplained},
+                             {"remaining", mismatch_json(d.remaining)},
+                             {"improvement", {{"bic_before", number(d.bic_before)}, {"bic_after", number(d.bic_after)}, {"runs", runs}}},
+                             {"price_of_ignorance", shifts},
+                             {"ranking", ranking},
+                             {"fit", ordered_json::parse(to_json(d.after))}};
+  return json.dump(2) + "\n";
+}
+
+std::string report(const Diagnosis& d) {
+  std::string text = verdict(d) + "\n";
+  if (d.mismatch.found) text += fmt::format("[[Mismatch]] p = {:.2g}\n    {}\n", d.mismatch.p_value, d.mismatch.summary);
+  for (const MissingEffect& m : d.missing) {
+    text += fmt::format("[[{}]] probability {:.4f} among the sets tried\n    {}    ({})\n", m.effect, m.probability, m.equation, m.source);
+    for (const FittedParameter& p : m.parameters)
+      text += fmt::format("    {} = {:.6g} +/- {:.2g} {}{}\n", p.name, p.value, p.std_error, p.unit, p.run.empty() ? "" : " (" + std::filesystem::path(p.run).filename().string() + ")");
+  }
+  for (const auto& set : d.equivalent) text += "    These runs cannot tell it from " + set_name(set) + ".\n";
+  if (d.unexplained) text += "[[Unexplained]]\n    " + d.remaining.summary + "\n";
+  text += "[[Improvement]]\n";
+  for (const ImprovedRun& r : d.runs)
+    text += fmt::format("    {:<20} {:<8} {:9.4g} -> {:9.4g} {} (noise {:.4g})\n", std::filesystem::path(r.file).filename().string(), r.heldout ? "held out" : "fitted", r.rms_before, r.rms_after, r.unit, r.noise);
+  if (d.ranking.size() > 1) {
+    text += "[[Tried]] reduced chi-square, BIC against nothing missing\n";
+    for (const Candidate& c : d.ranking) text += fmt::format("    {:<36} {:10.4g} {:12.5g}\n", set_name(c.effects), c.reduced_chi2, c.delta_bic);
+  }
+  return text;
+}
+
+}  // namespace unrig

@@ -1,0 +1,14 @@
+#pragma once
+#include <string>
+
+#include "fit/diagnose/diagnose.h"
+
+namespace unrig {
+
+/// diagnosis.json (formats.md, section 4), the winning fit in it as `fit`, the sets that were tried as `ranking`.
+std::string to_json(const Diagnosis& diagnosis);
+
+/// For a person: the verdict first, then the evidence.
+std::string report(const Diagnosis& diagnosis);
+
+}  // namespace unrig

@@ -1,0 +1,38 @@
+#include "fit/diagnose/heldout.h"
+
+#include <cmath>
+
+namespace unrig {
+
+using Eigen::Index;
+using Eigen::VectorXd;
+
+HeldoutResidual predict_heldout(const Arrival& arrival, const FitProblem& problem, const Run& run) {
+  const auto windows = problem.rig.is_modal() ? std::vector<MotionBasis::Window>{} : motion_windows(run);
+  std::vector<RunResidual> one;
+  one.emplace_back(*arrival.model, run, windows);
+  JointProblem joint(*arrival.model, std::move(one));
+  for (Unknown& u : joint.unknowns()) {
+    u.held = u.run < 0;
+    for (const Unknown& known : arrival.joint.unknowns())
+      if (known.parameter == u.parameter && (known.run == u.run || u.run >= 0)) u.value = known.value;
+  }
+  JointProblem::SolveOptions options;
+  options.iterations = 12;
+  options.tolerance = 1e-4;
+  joint.solve(options);
+  RunResidual& residual = joint.runs().front();
+  residual.reject_spikes(joint.theta(0));
+  joint.solve(options);
+  const RunResidual::Prediction p = residual.predict(joint.theta(0));
+  const VectorXd weight = residual.channel_weight(0), left = run.channel(p.channels.front()).value - p.output.col(0);
+  HeldoutResidual result{p.channels.front()};
+  double sum = 0, count = 0;
+  for (Index k = 0; k < left.size(); ++k)
+    if (weight[k] > 0 && std::isfinite(left[k])) sum += left[k] * left[k], ++count;
+  result.rms = std::sqrt(sum / std::max(1.0, count));
+  result.noise = residual.sigma(0);
+  return result;
+}
+
+}  // namespace unrig

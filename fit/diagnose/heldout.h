@@ -1,0 +1,18 @@
+#pragma once
+#include <string>
+
+#include "fit/arrival.h"
+
+namespace unrig {
+
+/// What a fit leaves of a run that it has not seen.
+struct HeldoutResidual {
+  std::string channel;
+  double rms = 0, noise = 0;  ///< of the first fitted channel, in its unit
+};
+
+/// Predicts `run` with all shared parameters held where `arrival` left them. What belongs to the run alone is its own: motion, initial state, zero, lift slope and
+/// the amplitudes of the effects' signals.
+HeldoutResidual predict_heldout(const Arrival& arrival, const FitProblem& problem, const Run& run);
+
+}  // namespace unrig

@@ -1,0 +1,139 @@
+#include "fit/diagnose/mismatch.h"
+
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+
+#include <fmt/format.h>
+
+#include "core/spectrum.h"
+#include "fit/coloured_noise.h"
+
+namespace unrig {
+namespace {
+
+using Eigen::Index;
+using Eigen::VectorXcd;
+using Eigen::VectorXd;
+
+constexpr double significant = 1e-3;
+constexpr double beyond_motion = 1.05;  // a motion that is known to its noise leaves up to a twentieth
+
+/// The residual of one fitted channel in units of its noise, 0 where left out.
+VectorXd left_over(const RunResidual& run, const RunResidual::Prediction& p, std::size_t c) {
+  const VectorXd& measured = run.run().channel(p.channels[c]).value;
+  const VectorXd weight = run.tempered() * run.channel_weight(c);
+  VectorXd left(measured.size());
+  for (Index k = 0; k < left.size(); ++k) left[k] = weight[k] > 0 && std::isfinite(measured[k]) ? weight[k] * (measured[k] - p.output(k, static_cast<Index>(c))) : 0;
+  return left;
+}
+
+double upper_normal(double z) { return 0.5 * std::erfc(z / std::sqrt(2.0)); }
+
+/// The shortest interval of `power` that holds the share `most` of what it has above `floor`.
+Interval holding(const VectorXd& power, double floor, double most) {
+  const Index n = power.size();
+  VectorXd sum = VectorXd::Zero(n + 1);
+  for (Index k = 0; k < n; ++k) sum[k + 1] = sum[k] + power[k] - floor;
+  const double wanted = most * sum[n];
+  Interval best{0, n};
+  if (!(wanted > 0)) return best;
+  Index last = 0;
+  for (Index first = 0; first < n; ++first) {
+    last = std::max(last, first);
+    while (last < n && sum[last] - sum[first] < wanted) ++last;
+    if (sum[last] - sum[first] < wanted) break;
+    if (last - first < best.length()) best = {first, last};
+  }
+  return best;
+}
+
+VectorXd smoothed(const VectorXd& x, Index half) {
+  VectorXd sum = VectorXd::Zero(x.size() + 1), out(x.size());
+  for (Index k = 0; k < x.size(); ++k) sum[k + 1] = sum[k] + x[k];
+  for (Index k = 0; k < x.size(); ++k) {
+    const Index a = std::max<Index>(0, k - half), b = std::min(x.size(), k + half + 1);
+    out[k] = (sum[b] - sum[a]) / static_cast<double>(b - a);
+  }
+  return out;
+}
+
+std::string name_of(const std::string& path) { return std::filesystem::path(path).filename().string(); }
+
+/// "82 % of the excess of step_a.csv lies between 13 and 17 Hz, from 1.0 to 1.4 s (0 to 3 semichords after the motion begins)".
+std::string describe(const RunResidual& run, const VectorXd& left, Mismatch& mismatch) {
+  constexpr double most = 0.8;
+  const double dt = run.run().dt;
+  const Interval time = holding(smoothed(left.cwiseAbs2(), 12), 1, most);
+  const VectorXcd lines = fourier(left);
+  const VectorXd power = lines.cwiseAbs2() / static_cast<double>(left.size());
+  const Interval band = holding(power, 1, most);
+  const double per_line = 1 / (dt * static_cast<double>(left.size()));
+  const double t0 = run.run().time(time.first), t1 = run.run().time(std::min(time.last, run.run().samples()) - 1);
+  const double f0 = static_cast<double>(band.first) * per_line, f1 = static_cast<double>(band.last) * per_line;
+  mismatch.time.push_back({t0, t1});
+  mismatch.frequency.push_back({f0, f1});
+  std::string text = fmt::format("{:.0f} % of the excess of {} lies between {:.3g} and {:.3g} Hz, and {:.0f} % of it between {:.3g} and {:.3g} s", 100 * most, name_of(run.run().file), f0, f1,
+                                 100 * most, t0, t1);
+  if (run.motion().unknowns() > 0 && run.conditions().speed > 0) {
+    const double onset = run.run().time(run.motion().active().front().first), per_second = run.conditions().speed / run.model().rig().semichord();
+    text += fmt::format(" ({:.2g} to {:.2g} semichords after the motion begins)", std::max(0.0, (t0 - onset) * per_second), (t1 - onset) * per_second);
+  }
+  return text;
+}
+
+}  // namespace
+
+std::array<double, 2> residual_power(const JointProblem& joint, std::size_t r) {
+  const RunResidual& run = joint.runs()[r];
+  const RunResidual::Prediction p = run.predict(joint.theta(r));
+  double sum = 0, count = 0;
+  for (std::size_t c = 0; c < p.channels.size(); ++c) {
+    const VectorXd left = left_over(run, p, c);
+    sum += left.squaredNorm();
+    count += static_cast<double>((left.array() != 0).count());
+  }
+  return {sum, count};
+}
+
+Mismatch locate_mismatch(const JointProblem& joint) {
+  Mismatch mismatch;
+  std::vector<VectorXd> residuals;
+  std::vector<std::size_t> owner;
+  for (std::size_t r = 0; r < joint.runs().size(); ++r) {
+    const RunResidual& run = joint.runs()[r];
+    const RunResidual::Prediction p = run.predict(joint.theta(r));
+    for (std::size_t c = 0; c < p.channels.size(); ++c) {
+      VectorXd left = left_over(run, p, c);
+      // In units of its own white part, where that can be told: the assumed level may be off by a few per cent.
+      const double count = static_cast<double>((left.array() != 0).count());
+      ChannelMismatch m{run.run().file, p.channels[c]};
+      m.energy = left.squaredNorm() / count;
+      const double freedom = count - static_cast<double>(run.linear_unknowns());
+      const double energy_p = upper_normal((left.squaredNorm() - freedom) / std::sqrt(2 * freedom) / beyond_motion - (beyond_motion - 1) * std::sqrt(freedom / 2));
+      RunResidual::Sensitivity one;
+      one.channels.push_back({left, {}});
+      m.p_value = std::min(1.0, 2 * std::min(energy_p, whiteness(one)));
+      m.excess = std::max(0.0, left.squaredNorm() - freedom);
+      mismatch.channels.push_back(m);
+      residuals.push_back(std::move(left));
+      owner.push_back(r);
+    }
+  }
+  const auto tests = static_cast<double>(mismatch.channels.size());
+  std::size_t worst = 0;
+  for (std::size_t i = 0; i < mismatch.channels.size(); ++i) {
+    const ChannelMismatch& m = mismatch.channels[i];
+    const double corrected = std::min(1.0, tests * m.p_value);
+    mismatch.p_value = std::min(mismatch.p_value, corrected);
+    if (corrected >= significant || m.energy < beyond_motion) continue;
+    mismatch.found = true;
+    mismatch.runs.push_back(m.run);
+    const std::string text = describe(joint.runs()[owner[i]], residuals[i], mismatch);
+    if (mismatch.summary.empty() || m.excess > mismatch.channels[worst].excess) mismatch.summary = text, worst = i;
+  }
+  if (!mismatch.found) mismatch.summary = "the model explains every run to its noise";
+  return mismatch;
+}
+
+}  // namespace unrig

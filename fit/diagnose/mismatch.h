@@ -1,0 +1,37 @@
+#pragma once
+#include <array>
+#include <string>
+#include <vector>
+
+#include "fit/joint_problem.h"
+
+namespace unrig {
+
+/// What a fit leaves of one channel of one run.
+struct ChannelMismatch {
+  std::string run, channel;
+  double energy = 0;      ///< residual power over noise power
+  double p_value = 1;     ///< probability that noise alone leaves as much, or as coloured: the lesser of two tests, twice
+  double excess = 0;      ///< energy above the noise, times samples
+};
+
+/// Where a fit and its recordings differ.
+struct Mismatch {
+  bool found = false;
+  double p_value = 1;  ///< of the most significant channel, times the number of channels (Bonferroni)
+  std::vector<ChannelMismatch> channels;
+  std::vector<std::string> runs;                ///< those with a significant mismatch
+  std::vector<std::array<double, 2>> time;      ///< s: the shortest stretch of each of them that holds most of the excess
+  std::vector<std::array<double, 2>> frequency; ///< Hz: likewise
+  std::string summary;
+};
+
+/// Energy: residual power against the white part of the residual itself, estimated from differences, which do not see a smooth mismatch. Colour: Bartlett's test of the
+/// cumulative periodogram. A mismatch is found where the p-value, corrected for the number of channels, is below 1e-3 and the residual's power exceeds the noise's
+/// by more than 5 %: a motion that is known to its noise leaves up to that.
+Mismatch locate_mismatch(const JointProblem& joint);
+
+/// Power of the fitted channels' residuals in units of the noise, of run `run`, without any tempering: sum of squares and count of samples.
+std::array<double, 2> residual_power(const JointProblem& joint, std::size_t run);
+
+}  // namespace unrig

@@ -1,0 +1,140 @@
+#include "fit/diagnose/search.h"
+
+#include <Eigen/QR>
+#include <algorithm>
+#include <cmath>
+
+#include "core/effects/effect.h"
+#include "core/spectrum.h"
+#include "fit/diagnose/mismatch.h"
+#include "fit/fit.h"
+
+namespace unrig {
+namespace {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+/// Share of a residual's samples that its colour leaves independent: the flatness of its spectrum, 1 for white noise.
+double independent_share(const RunResidual& run, const VectorXd& theta) {
+  const RunResidual::Prediction p = run.predict(theta);
+  VectorXd left = run.run().channel(p.channels.front()).value - p.output.col(0);
+  for (Index k = 0; k < left.size(); ++k)
+    if (!(run.channel_weight(0)[k] > 0) || !std::isfinite(left[k])) left[k] = 0;
+  const VectorXd power = fourier(left).cwiseAbs2();
+  const double mean = power.mean();
+  return mean > 0 ? std::min(1.0, 2 * mean * mean / power.cwiseAbs2().mean()) : 1;  // the lines of white noise are exponentially distributed
+}
+
+/// How far chi-square would fall by one Gauss-Newton step in all unknowns.
+double promised_share(const JointProblem& joint, double before) {
+  const JointProblem::Linearisation lin = joint.linearise();
+  std::vector<Index> free;
+  for (std::size_t i = 0; i < joint.unknowns().size(); ++i)
+    if (!joint.unknowns()[i].held && lin.jacobian.col(static_cast<Index>(i)).norm() > 0) free.push_back(static_cast<Index>(i));
+  MatrixXd j = lin.jacobian(Eigen::all, free);
+  for (Index k = 0; k < j.cols(); ++k) j.col(k).normalize();
+  const Eigen::ColPivHouseholderQR<MatrixXd> qr(j);
+  const VectorXd left = lin.residual - j * qr.solve(lin.residual);
+  return 1 - left.squaredNorm() / before;
+}
+
+/// Weights of the runs such that each is left with about the power of its noise; true where that changed any by more than a tenth.
+bool temper(JointProblem& joint) {
+  bool changed = false;
+  for (std::size_t r = 0; r < joint.runs().size(); ++r) {
+    const auto [power, samples] = residual_power(joint, r);
+    const double factor = std::sqrt(std::max(1.0, power / samples)), now = factor < 1.1 ? 1.0 : factor;
+    changed = changed || std::abs(std::log(now / joint.runs()[r].tempered())) > 0.1;
+    joint.runs()[r].temper(now);
+  }
+  return changed;
+}
+
+void anneal(Arrival& arrival, int rounds) {
+  for (int round = 0; round < rounds; ++round) {
+    JointProblem::SolveOptions options;
+    options.iterations = 8;
+    options.tolerance = 1e-4;
+    options.most_evaluations = 25;
+    solve(arrival, options);
+    if (!temper(arrival.joint)) return;
+  }
+}
+
+void measure(Trial& trial) {
+  JointProblem& joint = trial.arrival.joint;
+  trial.variance.clear();
+  trial.samples.clear();
+  trial.variables = 0;
+  for (std::size_t r = 0; r < joint.runs().size(); ++r) {
+    const auto [power, samples] = residual_power(joint, r);
+    trial.variance.push_back(power / samples);
+    trial.samples.push_back(samples * independent_share(joint.runs()[r], joint.theta(r)));
+    trial.variables += static_cast<int>(joint.runs()[r].linear_unknowns());
+  }
+  for (const Unknown& u : joint.unknowns()) trial.variables += u.held ? 0 : 1;
+}
+
+}  // namespace
+
+double Trial::reduced_chi2() const {
+  double power = 0, count = 0;
+  for (std::size_t r = 0; r < variance.size(); ++r) {
+    const auto n = static_cast<double>(arrival.joint.runs()[r].run().samples());
+    power += n * variance[r];
+    count += n;
+  }
+  return power / count;
+}
+
+double bic_difference(const Trial& a, const Trial& b) {
+  const Trial& better = a.reduced_chi2() < b.reduced_chi2() ? a : b;
+  double difference = 0, total = 0;
+  for (std::size_t r = 0; r < a.variance.size(); ++r) {
+    difference += better.samples[r] * std::log(a.variance[r] / b.variance[r]);
+    total += better.samples[r];
+  }
+  return difference + (a.variables - b.variables) * std::log(total);
+}
+
+Trial fit_baseline(const FitProblem& problem) {
+  const auto model = std::make_shared<const AeroelasticModel>(model_of(problem.rig, problem.runs, problem.circulation));
+  ArrivalEffort effort;
+  effort.other_starts = false;
+  effort.iterations = 10;
+  Trial trial{{}, arrive(problem, model, effort)};
+  temper(trial.arrival.joint);
+  anneal(trial.arrival, 5);
+  measure(trial);
+  return trial;
+}
+
+Trial prepare(const FitProblem& problem, const Trial& base, const std::vector<std::string>& effects) {
+  std::vector<std::string> added;
+  for (const std::string& id : effects)
+    if (std::find(base.effects.begin(), base.effects.end(), id) == base.effects.end()) added.push_back(id);
+  const auto model = std::make_shared<const AeroelasticModel>(model_of(problem.rig, problem.runs, problem.circulation, effects));
+  Trial trial{effects, extend(problem, base.arrival, model, added)};
+  trial.score = promised_share(trial.arrival.joint, base.arrival.joint.chi2());
+  return trial;
+}
+
+void fit_fully(Trial& trial) {
+  anneal(trial.arrival, 6);
+  measure(trial);
+}
+
+void fit_from_first_guesses(const FitProblem& problem, Trial& trial) {
+  ArrivalEffort effort;
+  effort.other_starts = false;
+  effort.iterations = 10;
+  Trial other{trial.effects, arrive_with_effects(problem, trial.arrival, effort), trial.score};
+  temper(other.arrival.joint);
+  anneal(other.arrival, 5);
+  measure(other);
+  if (bic_difference(other, trial) < 0) trial = std::move(other);
+}
+
+}  // namespace unrig

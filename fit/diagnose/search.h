@@ -1,0 +1,38 @@
+#pragma once
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "fit/arrival.h"
+
+namespace unrig {
+
+/// A set of effects, fitted.
+struct Trial {
+  std::vector<std::string> effects;
+  Arrival arrival;
+  double score = 0;               ///< share of chi-square that one linear step promised to remove, at the noise levels of the time
+  std::vector<double> variance = {};   ///< per run: residual power over noise power
+  std::vector<double> samples = {};    ///< per run: as many of them as the residual's colour leaves independent
+  int variables = 0;
+
+  double reduced_chi2() const;    ///< over all runs, in units of the noise
+};
+
+/// -2 ln likelihood with each run's own variance, plus ln(samples) per variable, of `a` less that of `b` (G. Schwarz, Annals of Statistics 6 (1978) 461). Samples count
+/// by the colour of the better of the two.
+double bic_difference(const Trial& a, const Trial& b);
+
+/// The best fit with nothing missing.
+Trial fit_baseline(const FitProblem& problem);
+
+/// One linear step from `base` with `effects` (those of base and one more): what would it remove?
+Trial prepare(const FitProblem& problem, const Trial& base, const std::vector<std::string>& effects);
+
+/// Fits a prepared trial with everything free, while the weights of the runs return to those of their noise.
+void fit_fully(Trial& trial);
+
+/// The same all over again from first guesses, with windows that grow from a few periods: for effects without which the rig's parameters go far astray. Keeps the better.
+void fit_from_first_guesses(const FitProblem& problem, Trial& trial);
+
+}  // namespace unrig

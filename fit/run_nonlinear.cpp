@@ -1,0 +1,247 @@
+#include <cmath>
+
+#include "core/nonlinear_response.h"
+#include "fit/run_linearised.h"
+
+// RunResidual with nonlinear effects at work: the linear unknowns c by Gauss-Newton steps.
+
+namespace unrig {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+namespace {
+
+/// Jerk and inputs of one segment.
+void drive_over(const Interval& s, bool moving, const VectorXd& jerk, const MatrixXd& inputs, NonlinearDrive& drive) {
+  drive.jerk = moving ? VectorXd(jerk.segment(s.first, s.length())) : VectorXd();
+  drive.input = inputs.cols() > 0 ? MatrixXd(inputs.middleRows(s.first, s.length() + 1)) : MatrixXd(s.length() + 1, 0);
+}
+
+}  // namespace
+
+VectorXd RunResidual::whole_jerk(const VectorXd& linear) const {
+  return motion_.unknowns() > 0 ? motion_of(motion_.coefficients(linear.head(motion_.unknowns())), run_->dt).jerk : VectorXd();
+}
+
+/// d jerk / d c over these samples: every spline's third difference.
+MatrixXd RunResidual::jerk_slope(const Interval& samples) const {
+  constexpr double third_difference[] = {1, -3, 3, -1};
+  const double cube = run_->dt * run_->dt * run_->dt;
+  MatrixXd slope = MatrixXd::Zero(samples.length(), unknowns_);
+  for (Index j = 0; j < motion_.unknowns(); ++j) {
+    const MotionBasis::Column& column = motion_.columns()[static_cast<std::size_t>(j)];
+    const Index length = column.value.size();
+    for (Index i = 0; i < length + 3; ++i) {  // from there on the splines of the tail cancel
+      const double amount = (i < length ? column.value[i] : column.tail) / cube;
+      for (Index d = 0; d < 4; ++d) {
+        if (i >= length && i + d >= length + 3) break;
+        const Index k = column.first + i + d - samples.first;
+        if (k >= 0 && k < samples.length()) slope(k, j) += amount * third_difference[d];
+      }
+    }
+  }
+  return slope;
+}
+
+/// The model at one c, without tangents.
+struct RunResidual::NonlinearPoint {
+  VectorXd linear;
+  MatrixXd left;  // measured - predicted, samples x channels
+  VectorXd equivalent_slope;
+  double chi2 = INFINITY;
+};
+
+RunResidual::NonlinearPoint RunResidual::nonlinear_point(const Linearised& lin, const VectorXd& theta, const VectorXd& linear) const {
+  NonlinearDrive from{initial_state(linear, lin.system.states()), whole_jerk(linear), inputs_, MatrixXd(lin.system.states(), 0), {}};
+  const NonlinearResponse response = follow(lin.system, lin.step, theta, from, last_sample_, Partials::none);
+  NonlinearPoint point{linear, {}, response.equivalent_slope};
+  if (!response.finite) return point;
+  point.left = measured_.topRows(last_sample_) - response.output;
+  point.left.rowwise() -= linear.segment(first_offset_, measured_.cols()).transpose();
+  point.chi2 = weight_.topRows(last_sample_).cwiseProduct(point.left).squaredNorm();
+  for (const MatrixXd& rows : angle_rows_) point.chi2 += (rows.leftCols(unknowns_) * linear - rows.col(unknowns_)).squaredNorm();
+  return point;
+}
+
+VectorXd RunResidual::largest_arguments(const VectorXd& theta) const {
+  const Solution solution = solve(theta);
+  const Linearised& lin = *solution.model;
+  if (lin.system.feedback.empty()) return {};
+  const NonlinearDrive from{initial_state(lin.linear, lin.system.states()), whole_jerk(lin.linear), inputs_, MatrixXd(lin.system.states(), 0), {}};
+  return follow(lin.system, lin.step, theta, from, last_sample_, Partials::none).largest_argument;
+}
+
+/// The rows [c | y] of the model linearised about `linear`; solves them for the next c. False where the model diverges.
+bool RunResidual::stack_nonlinear_rows(Linearised& lin, const VectorXd& theta, const VectorXd& linear) const {
+  const Index n = lin.system.states();
+  const VectorXd jerk = whole_jerk(linear);
+  NonlinearDrive from{initial_state(linear, n), {}, {}, {}, {}};
+  MatrixXd start = MatrixXd::Zero(n, unknowns_);  // d state / d c
+  for (std::size_t i = 0; i < free_.size(); ++i) start(free_[i], first_state_ + static_cast<Index>(i)) = 1;
+  std::vector<MatrixXd> rows;
+  double unreachable = 0;
+  lin.blocks.clear();
+  for (const Segment& segment : segments_) {
+    const Interval s = counted(segment);
+    if (s.length() <= 0) break;
+    drive_over(s, segment.moving, jerk, inputs_, from);
+    from.start_tangent = segment.moving ? start : MatrixXd::Identity(n, n);
+    from.jerk_tangent = segment.moving ? jerk_slope(s) : MatrixXd();
+    NonlinearResponse response = follow(lin.system, lin.step, theta, from, s.length(), Partials::none);
+    if (!response.finite) return false;
+    for (Index c = 0; c < measured_.cols(); ++c) {
+      const auto w = weight_.col(c).segment(s.first, s.length());
+      Linearised::Block block{s, segment.moving, c, s.length(), nullptr, std::move(response.tangent[static_cast<std::size_t>(c)]), {}};
+      VectorXd y = measured_.col(c).segment(s.first, s.length()) - response.output.col(c);  // beside the offset, which stays linear
+      MatrixXd reach;
+      if (segment.moving) {
+        y += block.rows * linear;
+        block.rows.col(first_offset_ + c).setOnes();
+        reach = w.asDiagonal() * block.rows;
+      } else {
+        block.start = start;
+        y += block.rows * (start * linear);
+        reach = block.rotate(w, block.rows, start, first_offset_ + c);
+      }
+      const auto [reached, others] = block.split(w.cwiseProduct(y));
+      unreachable += others.squaredNorm();
+      MatrixXd together(reach.rows(), unknowns_ + 1);
+      together << reach, reached;
+      rows.push_back(std::move(together));
+      lin.blocks.push_back(std::move(block));
+    }
+    from.start = response.end;
+    start = segment.moving ? response.end_tangent : MatrixXd(response.end_tangent * start);
+  }
+  rows.insert(rows.end(), angle_rows_.begin(), angle_rows_.end());
+  lin.settle(rows, unknowns_, unreachable);
+  return true;
+}
+
+/// The system with every feedback replaced by a linear law of this slope, and the rows of c in it.
+std::shared_ptr<RunResidual::Linearised> RunResidual::equivalent_linear(const Linearised& lin, const VectorXd& slope) const {
+  auto plain = std::make_shared<Linearised>();
+  plain->system = lin.system;
+  LinearSystem& system = plain->system;
+  const Index measured = system.B.cols() - slope.size();
+  for (Index i = 0; i < slope.size(); ++i) {
+    const Eigen::RowVectorXd sees = slope[i] * lin.system.feedback[static_cast<std::size_t>(i)].sees;
+    system.A.value += lin.system.B.value.col(measured + i) * sees;
+    system.C.value += lin.system.D.value.col(measured + i) * sees;
+  }
+  system.feedback.clear();
+  for (DualMatrix* m : {&system.B, &system.D}) *m = m->block(0, 0, m->rows(), measured);
+  plain->step = exact_step(system, run_->dt);
+  prepare_linear(*plain);
+  stack_rows(*plain);
+  return plain;
+}
+
+namespace {
+
+constexpr double negligible = 1e-5;  // of the unit that chi-square rises by at one standard deviation
+
+bool worth_going_on(double promised, double chi2) { return promised > negligible + 1e-9 * chi2; }
+
+}  // namespace
+
+/// c from the last solution or, where there is none, from that of the linear part alone.
+void RunResidual::solve_nonlinear(Linearised& lin, const VectorXd& theta) const {
+  const auto feedbacks = static_cast<Index>(lin.system.feedback.size());
+  NonlinearPoint point;
+  if (last_linear_.size() > 0) point = nonlinear_point(lin, theta, last_linear_);
+  if (!std::isfinite(point.chi2)) point = nonlinear_point(lin, theta, equivalent_linear(lin, VectorXd::Zero(feedbacks))->linear);
+  lin.chi2 = INFINITY;
+  if (!std::isfinite(point.chi2)) return;
+  if (motion_.unknowns() > 0)
+    search_along_equivalent(lin, theta, std::move(point));
+  else
+    search_along_tangents(lin, theta, std::move(point));
+  if (std::isfinite(lin.chi2)) last_linear_ = lin.linear;
+}
+
+/// Gauss-Newton steps in c, halved where chi-square does not fall.
+void RunResidual::search_along_tangents(Linearised& lin, const VectorXd& theta, NonlinearPoint point) const {
+  constexpr int most = 30;
+  for (int i = 0; i < most; ++i) {
+    if (!stack_nonlinear_rows(lin, theta, point.linear)) {
+      lin.chi2 = INFINITY;
+      return;
+    }
+    const VectorXd step = lin.linear - point.linear;
+    const double promised = point.chi2 - lin.chi2;
+    lin.linear = point.linear;
+    lin.chi2 = point.chi2;
+    if (!worth_going_on(promised, point.chi2)) return;
+    double fraction = 1;
+    NonlinearPoint next = nonlinear_point(lin, theta, point.linear + step);
+    while (!(next.chi2 < point.chi2) && fraction > 1e-3) {
+      fraction /= 2;
+      next = nonlinear_point(lin, theta, point.linear + fraction * step);
+    }
+    if (!(next.chi2 < point.chi2)) return;
+    point = std::move(next);
+  }
+}
+
+/// Steps in c along the rows of the equivalent linear system, which is made anew where they stop helping.
+void RunResidual::search_along_equivalent(Linearised& lin, const VectorXd& theta, NonlinearPoint point) const {
+  constexpr int systems = 4, most = 12;
+  for (int made = 0; made < systems; ++made) {
+    const std::shared_ptr<Linearised> plain = equivalent_linear(lin, point.equivalent_slope);
+    lin.tangents = plain;
+    bool arrived = false;
+    for (int i = 0; i < most && !arrived; ++i) {
+      std::vector<MatrixXd> rows;
+      for (const Linearised::Block& block : plain->blocks) {
+        const Interval& s = block.samples;
+        rows.push_back(block.split(weight_.col(block.channel).segment(s.first, s.length()).cwiseProduct(point.left.col(block.channel).segment(s.first, s.length()))).first);
+      }
+      for (const MatrixXd& angle : angle_rows_) rows.emplace_back(angle.col(unknowns_) - angle.leftCols(unknowns_) * point.linear);
+      const MatrixXd rotated = plain->eliminate->rotated(run_rows::stacked(rows, 1));
+      const double promised = rotated.topRows(plain->eliminate->rank()).squaredNorm();
+      if (!worth_going_on(promised, point.chi2)) {
+        arrived = true;
+        break;
+      }
+      const VectorXd step = plain->eliminate->solve(rotated);
+      NonlinearPoint next = nonlinear_point(lin, theta, point.linear + step);
+      if (!(next.chi2 < point.chi2)) next = nonlinear_point(lin, theta, point.linear + 0.3 * step);
+      if (!(next.chi2 < point.chi2)) {
+        arrived = made > 0;
+        break;
+      }
+      const bool slow = point.chi2 - next.chi2 < 0.3 * promised;
+      point = std::move(next);
+      if (slow && i > 3) break;
+    }
+    if (arrived) break;
+  }
+  lin.linear = point.linear;
+  lin.chi2 = point.chi2;
+}
+
+void RunResidual::follow_nonlinear_partials(const LinearSystem& system, const VectorXd& theta, const VectorXd& linear, const TakeRows& take) const {
+  const ExactStep step = exact_step(system, run_->dt);
+  const auto parameters = static_cast<Index>(model_->parameters().size());
+  const VectorXd jerk = whole_jerk(linear);
+  NonlinearDrive from{initial_state(linear, system.states()), {}, {}, MatrixXd(system.states(), 0), {}};
+  for (const Segment& segment : segments_) {
+    const Interval s = counted(segment);
+    if (s.length() <= 0) break;
+    drive_over(s, segment.moving, jerk, inputs_, from);
+    const NonlinearResponse response = follow(system, step, theta, from, s.length(), Partials::all);
+    for (Index c = 0; c < measured_.cols(); ++c) {
+      MatrixXd m(s.length(), parameters + 1);
+      m << response.tangent[static_cast<std::size_t>(c)], response.output.col(c);
+      m.col(parameters).array() += linear[first_offset_ + c];
+      take(s, c, std::move(m));
+    }
+    from.start = response.end;
+    from.start_partial = response.end_tangent;
+  }
+}
+
+}  // namespace unrig
