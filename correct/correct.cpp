@@ -127,7 +127,7 @@ CorrectedLoad corrected_load(const RunResidual& residual, const UncertaintyBudge
   MatrixXd by_c = MatrixXd::Zero(by_motion.rows(), residual.linear_unknowns());
   by_c.leftCols(by_motion.cols()) = by_motion;
   by_c.col(residual.first_offset()).setConstant(steady_per_reading(residual.model().rig()));
-  const Uncertainty u = budget.of(by_theta, by_c);
+  const UncertaintyBySource u = budget.of(by_theta, by_c);
   return {value, interpolated(u.std, at, value.size()), interpolated(u.by_source, at, value.size()), u.simultaneous, {}, {}};
 }
 

@@ -52,7 +52,7 @@ std::string to_indicial_csv(const CorrectResult& r) {
   std::string text = "semichords,indicial,indicial_std" + further_columns("indicial", "") + ",cn_per_radian [1/rad],cn_per_radian_std [1/rad]\n";
   auto out = std::back_inserter(text);
   for (Index i = 0; i < response.value.size(); ++i) {
-    const Uncertainty& u = response.uncertainty;
+    const UncertaintyBySource& u = response.uncertainty;
     fmt::format_to(out, "{:.6g},{:.6g},{:.4g}", response.semichords[i], response.value[i], u.std[i]);
     further_cells(out, u.by_source.row(i), u.simultaneous * u.std[i], response.half_weight[i], response.twice_weight[i]);
     fmt::format_to(out, ",{:.6g},{:.4g}\n", response.per_radian[i], response.per_radian_std[i]);

@@ -9,7 +9,7 @@ namespace unrig {
 /// Indicial response over semichords after a unit step of downwash; 1 at infinity: phi(s) = 1 - sum_k A_k exp(-beta_k s).
 struct IndicialResponse {
   Eigen::VectorXd semichords, value;
-  Uncertainty uncertainty;
+  UncertaintyBySource uncertainty;
   Eigen::VectorXd per_radian, per_radian_std;  ///< normal-force coefficient after a step of one radian: slope times phi
   Eigen::VectorXd half_weight, twice_weight;  ///< the answer at half and at twice the regularisation's weight
   double at_step = 0, at_step_std = 0;        ///< phi(0), and its standard deviation

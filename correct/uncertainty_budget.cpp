@@ -114,10 +114,10 @@ UncertaintyBudget::UncertaintyBudget(const RunResidual& residual, const RunResid
   for (const MatrixXd& s : by_source_) root_.middleCols(at, s.cols()) = s, at += s.cols();
 }
 
-Uncertainty UncertaintyBudget::of(const MatrixXd& by_theta, const MatrixXd& by_c) const {
+UncertaintyBySource UncertaintyBudget::of(const MatrixXd& by_theta, const MatrixXd& by_c) const {
   MatrixXd rows(by_theta.rows(), by_theta.cols() + by_c.cols());
   rows << by_theta, by_c;
-  Uncertainty u;
+  UncertaintyBySource u;
   u.by_source.resize(rows.rows(), sources);
   const MatrixXd all = rows * root_;
   Index at = 0;

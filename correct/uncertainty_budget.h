@@ -13,7 +13,7 @@ constexpr std::array source_names{"gauge", "angle", "calibration", "rig", "regul
 constexpr Eigen::Index sources = source_names.size();
 
 /// Standard deviations of quantities, one per row.
-struct Uncertainty {
+struct UncertaintyBySource {
   Eigen::VectorXd std;          ///< total: root of the sum of squares
   Eigen::MatrixXd by_source;    ///< quantities x sources
   double simultaneous = 0;      ///< all quantities together stay within this many standard deviations with a probability of 95 %
@@ -35,7 +35,7 @@ class UncertaintyBudget {
                     double calibration_uncertainty, double inflation);
 
   /// Of quantities that move with theta and c by these rows.
-  Uncertainty of(const Eigen::MatrixXd& by_theta, const Eigen::MatrixXd& by_c) const;
+  UncertaintyBySource of(const Eigen::MatrixXd& by_theta, const Eigen::MatrixXd& by_c) const;
 
   /// Columns over z whose products with themselves sum to the covariance.
   const Eigen::MatrixXd& root() const { return root_; }

@@ -221,6 +221,9 @@ void RunResidual::search_along_equivalent(Linearised& lin, const VectorXd& theta
   }
   lin.linear = point.linear;
   lin.chi2 = point.chi2;
+  if (!exact_tangents_) return;
+  lin.tangents.reset();
+  search_along_tangents(lin, theta, std::move(point));
 }
 
 void RunResidual::follow_nonlinear_partials(const LinearSystem& system, const VectorXd& theta, const VectorXd& linear, const TakeRows& take) const {

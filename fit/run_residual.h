@@ -135,6 +135,10 @@ class RunResidual {
   }
   double tempered() const { return tempered_; }
 
+  /// Lets c of a nonlinear run with prescribed motion be searched along exact tangents too, from where the equivalent linear system led: an order slower, and needed
+  /// where the rig moves so little that the law is far from any line (friction that sticks).
+  void search_exactly(bool exact) { exact_tangents_ = exact; }
+
   Eigen::VectorXd channel_weight(std::size_t channel) const { return weight_.col(static_cast<Eigen::Index>(channel)); }
   const Eigen::VectorXd& angle_weight() const { return angle_weight_; }
 
@@ -177,6 +181,7 @@ class RunResidual {
   Eigen::MatrixXd weight_;    ///< 1 / sigma, 0 where left out
   std::vector<double> sigma_;
   double tempered_ = 1;
+  bool exact_tangents_ = false;
   Eigen::VectorXd angle_, angle_weight_;
   double angle_sigma_ = 0;
   Eigen::MatrixXd motion_prior_;  ///< [c | 0]

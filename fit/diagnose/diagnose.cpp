@@ -19,6 +19,7 @@ using Strings = std::vector<std::string>;
 
 constexpr double explained = 1.15;     // residual power over noise power of a model that leaves nothing to name
 constexpr double nearly_all = 0.97;    // share of the excess that an effect must remove to be named where something remains
+constexpr double nearly_explained = 10;
 constexpr double decisive = 10;        // BIC: very strong evidence (Kass and Raftery 1995)
 constexpr std::size_t most_refits = 5, most_effects = 3;
 
@@ -84,6 +85,13 @@ Trial without_superfluous(const FitProblem& fit_problem, Trial trial) {
   return trial;
 }
 
+bool nonlinear(const Trial& trial) {
+  const JointProblem& joint = trial.arrival.joint;
+  for (std::size_t r = 0; r < joint.runs().size(); ++r)
+    if (joint.runs()[r].largest_arguments(joint.theta(r)).size() > 0) return true;
+  return false;
+}
+
 double excess(const Trial& trial) { return std::max(0.0, trial.reduced_chi2() - 1); }
 
 /// exp(-BIC/2) over the sum of it over all.
@@ -119,6 +127,7 @@ Diagnosis diagnose(const DiagnoseProblem& problem) {
     for (const Trial& t : tried) d.ranking.push_back({t.effects, t.reduced_chi2(), bic_difference(t, baseline), 0, best.effects.empty() ? t.score : 0});
     if (tried.empty() || bic_difference(tried.front(), best) > -decisive) break;
     best = without_superfluous(fit_problem, tried.front());
+    if (nonlinear(best) && best.reduced_chi2() > explained && best.reduced_chi2() < nearly_explained) fit_exactly(best);
   }
   give_probabilities(d.ranking);
   std::sort(d.ranking.begin(), d.ranking.end(), [](const Candidate& a, const Candidate& b) { return a.delta_bic < b.delta_bic; });

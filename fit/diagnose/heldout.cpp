@@ -23,6 +23,7 @@ HeldoutResidual predict_heldout(const Arrival& arrival, const FitProblem& proble
   joint.solve(options);
   RunResidual& residual = joint.runs().front();
   residual.reject_spikes(joint.theta(0));
+  residual.search_exactly(true);
   joint.solve(options);
   const RunResidual::Prediction p = residual.predict(joint.theta(0));
   const VectorXd weight = residual.channel_weight(0), left = run.channel(p.channels.front()).value - p.output.col(0);

@@ -126,6 +126,12 @@ void fit_fully(Trial& trial) {
   measure(trial);
 }
 
+void fit_exactly(Trial& trial) {
+  for (RunResidual& run : trial.arrival.joint.runs()) run.search_exactly(true);
+  anneal(trial.arrival, 3);
+  measure(trial);
+}
+
 void fit_from_first_guesses(const FitProblem& problem, Trial& trial) {
   ArrivalEffort effort;
   effort.other_starts = false;

@@ -23,7 +23,7 @@ using std::numbers::pi;
 
 double part(const MatrixXd& by_source, Index row, Source source) { return by_source(row, static_cast<Index>(source)); }
 
-TEST(Uncertainty, SourcesAddUpToTheWhole) {
+TEST(UncertaintyBySource, SourcesAddUpToTheWhole) {
   CorrectProblem problem = test::null_problem("heldout");
   problem.calibration_uncertainty = 0.01;
   const CorrectResult result = correct(problem);
@@ -41,7 +41,7 @@ TEST(Uncertainty, SourcesAddUpToTheWhole) {
   for (Index i = 0; i < result.indicial.value.size(); ++i) EXPECT_LT(part(result.indicial.uncertainty.by_source, i, Source::calibration), 5e-3);
 }
 
-TEST(Uncertainty, CalibrationErrorMovesTheLoadAsStated) {
+TEST(UncertaintyBySource, CalibrationErrorMovesTheLoadAsStated) {
   // The estimate of the same run with its gauge read 1 % too high: what the budget predicts, to first order.
   CorrectProblem problem = test::null_problem("step_a");
   problem.calibration_uncertainty = 0.01;
@@ -53,7 +53,7 @@ TEST(Uncertainty, CalibrationErrorMovesTheLoadAsStated) {
     EXPECT_NEAR(high.circulatory.value[k] - result.circulatory.value[k], part(result.circulatory.by_source, k, Source::calibration), 0.05 * 0.01 * result.circulatory.value[k]) << k;
 }
 
-TEST(Uncertainty, WeightOfTheRegularisationHardlyMatters) {
+TEST(UncertaintyBySource, WeightOfTheRegularisationHardlyMatters) {
   const CorrectResult result = correct(test::null_problem("step_a"));
   EXPECT_GT(result.determined, 5);  // of 11 amplitudes
   const VectorXd half = (result.indicial.half_weight - result.indicial.value).cwiseAbs(), twice = (result.indicial.twice_weight - result.indicial.value).cwiseAbs();
@@ -66,7 +66,7 @@ TEST(Uncertainty, WeightOfTheRegularisationHardlyMatters) {
   }
 }
 
-TEST(Uncertainty, SimultaneousFactorHoldsForKnownCurves) {
+TEST(UncertaintyBySource, SimultaneousFactorHoldsForKnownCurves) {
   // A constant is one point: 1.96. Two independent points: the tube formula is an upper bound of the exact Phi^-1(sqrt(0.95)), 2.236.
   EXPECT_NEAR(simultaneous_factor(MatrixXd::Ones(50, 1)), 1.95996, 1e-4);
   const double two = simultaneous_factor(MatrixXd::Identity(2, 2));
