@@ -7,11 +7,13 @@
 #include <cmath>
 #include <numbers>
 #include <numeric>
+#include <stdexcept>
 #include <vector>
 
 #include "core/exact_step.h"
 #include "core/ideal_step.h"
 #include "core/motion.h"
+#include "core/nonlinear_response.h"
 #include "core/response.h"
 #include "core/rigid_system.h"
 #include "core/run_inputs.h"
@@ -121,13 +123,37 @@ MatrixXd response_to_pitch(const LinearSystem& system, const VectorXd& angle, do
   return motion_response(system, interpolated_motion(angle, dt), dt);
 }
 
-/// Of the measured inputs, and of the static deflection that a pluck starts from.
-MatrixXd response_to_inputs(const SimulateProblem& problem, const LinearSystem& system, const Conditions& conditions) {
-  const MatrixXd input = inputs_of(problem.run, conditions);
-  if (input.cols() == 0) return MatrixXd::Zero(problem.run.samples(), system.C.rows());
+/// Where the run starts: static deflection, signals, and the spline's acceleration.
+VectorXd start_of(const SimulateProblem& problem, const LinearSystem& system, const Motion& motion) {
   VectorXd start = VectorXd::Zero(system.states());
   if (problem.release_load) start = static_state(system, *problem.release_load * system.B.value.col(0));
-  return drive(system, exact_step(system, problem.run.dt), DualMatrix(start), problem.run.samples(), {}, input, Partials::none).output;
+  if (problem.signals.size() > 0) {
+    if (problem.signals.size() != static_cast<Index>(system.exogenous.size()))
+      throw std::invalid_argument(fmt::format("{} values for the {} signal states of the effects", problem.signals.size(), system.exogenous.size()));
+    start(system.exogenous) = problem.signals;
+  }
+  if (motion.jerk.size() > 0) start.segment(system.motion, 3) << motion.angle[0], motion.rate[0], motion.acceleration[0];
+  return start;
+}
+
+/// Of motion, measured inputs and start in one pass: with nonlinear effects they do not add up. Jumps are added by themselves, to a linear system.
+MatrixXd response_of(const SimulateProblem& problem, const LinearSystem& system, const Conditions& conditions) {
+  const Run& run = problem.run;
+  const bool jumps = system.motion >= 0 && problem.pitch == PitchBetweenSamples::jumps;
+  if (jumps && !system.feedback.empty())
+    throw InputError({run.file, 0}, "the angle jumps while a nonlinear effect is at work", "wanted only linear effects for ideal steps", "Leave out --jumps, or the effect.");
+  const Motion motion = system.motion >= 0 && !jumps ? interpolated_motion(run.channel("alpha").value, run.dt) : Motion{};
+  const MatrixXd input = inputs_of(run, conditions);
+  const VectorXd start = start_of(problem, system, motion);
+  const ExactStep step = exact_step(system, run.dt);
+  if (!system.feedback.empty()) {
+    const NonlinearResponse response = follow(system, step, problem.theta, {start, motion.jerk, input, MatrixXd(system.states(), 0), {}}, run.samples(), Partials::none);
+    if (!response.finite) throw NoAnswer(run.file + ": the response with its nonlinear effects grows beyond all bounds");
+    return response.output;
+  }
+  MatrixXd output = drive(system, step, DualMatrix(start), run.samples(), motion.jerk, input.cols() > 0 ? input : MatrixXd(), Partials::none).output;
+  if (jumps) output += jump_response(system, run.channel("alpha").value, run.dt);
+  return output;
 }
 
 /// Outputs in the steady state of the first angle.
@@ -183,11 +209,10 @@ SimulateResult simulate(const SimulateProblem& problem) {
   const LinearSystem system = problem.model.system(conditions, problem.theta, result.simulated);
 
   result.run = run;
-  MatrixXd reading = response_to_inputs(problem, system, conditions);
+  MatrixXd reading = response_of(problem, system, conditions);
   if (system.motion >= 0) {
     const VectorXd& angle = run.channel("alpha").value;
     if (problem.pitch == PitchBetweenSamples::spline) warn_of_noise(angle, result.warnings);
-    reading += response_to_pitch(system, angle, run.dt, problem.pitch);
     reading.rowwise() += steady_reading(problem, system, angle[0]).transpose();
   }
   for (std::size_t c = 0; c < outputs.size(); ++c) put(result.run, outputs[c].name, outputs[c].unit, reading.col(static_cast<Index>(c)));

@@ -23,6 +23,7 @@ struct SimulateProblem {
   PitchBetweenSamples pitch = PitchBetweenSamples::spline;
   std::optional<double> release_load;         ///< N at the calibration element, let go at the first sample (a pluck starts so)
   std::optional<double> steady_normal_force;  ///< coefficient before the motion; without it, slope times the first angle
+  Eigen::VectorXd signals = {};  ///< initial values of the effects' signals (LinearSystem::exogenous), in their units; empty: all zero
 };
 
 struct SimulateResult {
@@ -38,10 +39,14 @@ struct SimulateResult {
 /// else at rest. The steady state is that of the linear model, x = -A^-1 A_p p, so that a rig whose strips lift ahead of its pitch axis
 /// stands twisted; the angle it starts from must be small for this to make sense, otherwise give `steady_normal_force`.
 ///
+/// Nonlinear effects are followed together with motion, inputs and start in one pass (core/nonlinear_response.h). A pluck is released from the static
+/// deflection of the linear model: with a cubic spring or a gap at work the true one differs.
+///
 /// At a jump the reading itself has delta functions, which no sample can show; the sample at the jump holds the limit from the right.
 ///
 /// Throws InputError where the run lacks what its kind needs: a number in every sample of alpha (step), a release load (pluck), the inputs
-/// of a forced or moved run; and for a release load where the rig has no calibration element.
+/// of a forced or moved run; for a release load where the rig has no calibration element; for jumps where a nonlinear effect is at work. NoAnswer where a
+/// nonlinear response is not finite.
 SimulateResult simulate(const SimulateProblem& problem);
 
 /// What the gauge reads, per unit normal-force coefficient N / (rho U^2 b l) on every strip [N].
