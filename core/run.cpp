@@ -300,8 +300,9 @@ const Channel& Run::channel(std::string_view column) const {
                    fmt::format("wanted a column \"{}\"", column), "");
 }
 
-Run read_run(const std::string& path) {
-  const std::string text = read_text(path);
+Run read_run(const std::string& path) { return parse_run(read_text(path), path); }
+
+Run parse_run(std::string_view text, const std::string& path) {
   const Split parts = split(text, path);
   const TomlTable meta =
       TomlTable::parse(parts.meta_data, path, "Text stands in double quotes; a remark among the meta data begins with `# #`.");

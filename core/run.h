@@ -63,4 +63,7 @@ struct Run {
 /// negative or missing weight, a calibration of a column that has its unit already, a required key that is missing.
 Run read_run(const std::string& path);
 
+/// The same for a run file's text, which messages call `path`.
+Run parse_run(std::string_view text, const std::string& path);
+
 }  // namespace unrig

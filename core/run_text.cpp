@@ -11,19 +11,6 @@
 namespace unrig {
 namespace {
 
-/// A TOML basic string.
-std::string quoted(std::string_view text) {
-  std::string out = "\"";
-  for (const char c : text) {
-    if (c == '"' || c == '\\') out += '\\';
-    if (static_cast<unsigned char>(c) < 0x20 || c == 0x7f)
-      out += fmt::format("\\u{:04X}", static_cast<unsigned>(static_cast<unsigned char>(c)));
-    else
-      out += c;
-  }
-  return out + '"';
-}
-
 /// The unit a channel is written in and SI per that unit: its file's where a factor is all that lies between.
 struct WrittenUnit {
   std::string unit;
@@ -44,11 +31,23 @@ WrittenUnit written_unit(const Channel& channel) {
 
 }  // namespace
 
+std::string toml_string(std::string_view text) {
+  std::string out = "\"";
+  for (const char c : text) {
+    if (c == '"' || c == '\\') out += '\\';
+    if (static_cast<unsigned char>(c) < 0x20 || c == 0x7f)
+      out += fmt::format("\\u{:04X}", static_cast<unsigned>(static_cast<unsigned char>(c)));
+    else
+      out += c;
+  }
+  return out + '"';
+}
+
 std::string run_text(const Run& run, const std::vector<std::string>& remarks) {
   std::string text = "# unrig_run = 1\n";
   for (const std::string& remark : remarks) text += "# # " + remark + "\n";
-  text += fmt::format("# name = {}\n# kind = {}\n", quoted(run.name), quoted(to_string(run.kind)));
-  if (!run.medium.empty()) text += fmt::format("# medium = {}\n", quoted(run.medium));
+  text += fmt::format("# name = {}\n# kind = {}\n", toml_string(run.name), toml_string(to_string(run.kind)));
+  if (!run.medium.empty()) text += fmt::format("# medium = {}\n", toml_string(run.medium));
   text += fmt::format("# density = \"{:.12g} kg/m^3\"\n# speed = \"{:.12g} m/s\"\n", run.density, run.speed);
 
   std::vector<double> factor;

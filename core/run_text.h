@@ -1,5 +1,6 @@
 #pragma once
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "core/run.h"
@@ -12,5 +13,8 @@ namespace unrig {
 /// A channel stands in the unit of the file it came from; one that was calibrated (volts to newtons) or shifted (degC) stands in SI, and so
 /// the calibration is not repeated. Numbers carry ten significant digits, missing samples are `nan`.
 std::string run_text(const Run& run, const std::vector<std::string>& remarks = {});
+
+/// `text` as a TOML basic string, quotes included.
+std::string toml_string(std::string_view text);
 
 }  // namespace unrig

@@ -97,6 +97,13 @@ double TomlTable::number(std::string_view key) const { return finite(required(ke
 
 double TomlTable::number_or(std::string_view key, double fallback) const { return has(key) ? number(key) : fallback; }
 
+bool TomlTable::boolean_or(std::string_view key, bool fallback) const {
+  if (!has(key)) return fallback;
+  const auto* value = required(key).as_boolean();
+  if (!value) fail(key, fmt::format("{} is {}", full_name(key), shown(required(key))), "wanted true or false");
+  return value->get();
+}
+
 int TomlTable::integer(std::string_view key) const {
   const toml::node& node = required(key);
   const auto value = node.is_integer() ? node.value<int>() : std::nullopt;

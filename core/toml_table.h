@@ -40,6 +40,7 @@ class TomlTable {
   std::string text_or(std::string_view key, const std::string& fallback) const;
   double number(std::string_view key) const;
   double number_or(std::string_view key, double fallback) const;
+  bool boolean_or(std::string_view key, bool fallback) const;
   int integer(std::string_view key) const;
   std::vector<int> integers(std::string_view key) const;
   /// One value with its unit, in SI.

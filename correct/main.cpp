@@ -4,6 +4,7 @@
 
 #include "core/command.h"
 #include "core/error.h"
+#include "core/import/import_command.h"
 #include "correct/correct_command.h"
 #include "correct/report/report_command.h"
 #include "fit/apparent_mass_command.h"
@@ -14,6 +15,7 @@
 namespace {
 
 constexpr unrig::Command commands[] = {
+    {"import", "turn a laboratory's file (text, MATLAB, TDMS, universal file) into a run file", unrig::import_command},
     {"simulate", "simulate what gauge and sensors of a rig read in a run", unrig::simulate_command},
     {"fit", "fit stiffness, damping and apparent mass of a rig to recordings", unrig::fit_command},
     {"apparent-mass", "apparent mass of the fluid from the frequencies of a dry and a wet free decay", unrig::apparent_mass_command},

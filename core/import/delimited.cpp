@@ -1,0 +1,127 @@
+#include "core/import/delimited.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include <fmt/format.h>
+
+#include "core/error.h"
+#include "core/scan.h"
+
+namespace unrig {
+namespace {
+
+std::vector<std::string_view> cells_of(std::string_view line, const std::string& delimiter) {
+  std::vector<std::string_view> cells;
+  if (delimiter == "blanks") {
+    for (std::size_t at = line.find_first_not_of(" \t"); at != std::string_view::npos; at = line.find_first_not_of(" \t", at)) {
+      const std::size_t end = std::min(line.find_first_of(" \t", at), line.size());
+      cells.push_back(line.substr(at, end - at));
+      at = end;
+    }
+    return cells;
+  }
+  for (std::size_t at = 0;;) {
+    const std::size_t quoted = at < line.size() && line[at] == '"' ? line.find('"', at + 1) : at;
+    const std::size_t end = std::min(line.find(delimiter, quoted == std::string_view::npos ? at : quoted), line.size());
+    std::string_view cell = trimmed(line.substr(at, end - at));
+    if (cell.size() >= 2 && cell.front() == '"' && cell.back() == '"') cell = cell.substr(1, cell.size() - 2);
+    cells.push_back(cell);
+    if (end == line.size()) return cells;
+    at = end + delimiter.size();
+  }
+}
+
+std::string delimiter_in(std::string_view line, const std::string& decimal) {
+  const auto count = [&](char c) { return std::count(line.begin(), line.end(), c); };
+  for (const char c : {'\t', ';'})
+    if (count(c) > 0) return std::string(1, c);
+  if (decimal != "," && count(',') > 0) return ",";
+  return "blanks";
+}
+
+/// "Force [N]" or "Force (N)" -> name and unit.
+RecordedChannel named(std::string_view cell) {
+  RecordedChannel channel{std::string(cell), "", {}, "", 0, 0};
+  for (const auto& [open, close] : {std::pair{'[', ']'}, std::pair{'(', ')'}}) {
+    const std::size_t at = cell.rfind(open);
+    if (at == std::string_view::npos || at == 0 || cell.back() != close) continue;
+    channel.name = trimmed(cell.substr(0, at));
+    channel.unit = trimmed(cell.substr(at + 1, cell.size() - at - 2));
+    break;
+  }
+  return channel;
+}
+
+class Table {
+ public:
+  Table(std::string_view text, const std::string& file, const DelimitedFormat& format) : text_(text), format_(format), out_{file, "text", {}, {}} {}
+
+  Recording read() {
+    if (text_.starts_with("\xEF\xBB\xBF")) text_.remove_prefix(3);
+    if (text_.starts_with("\xFF\xFE") || text_.starts_with("\xFE\xFF")) refuse("the file is in UTF-16", "wanted UTF-8 or ASCII text", "Save it again as UTF-8.");
+    std::string_view line;
+    for (int i = 0; i < format_.skip_lines; ++i)
+      if (!next(line, false)) refuse(fmt::format("the file ends within the {} lines to skip", format_.skip_lines), "wanted a table behind them", "");
+    if (!next(line, true)) refuse("the file holds no table", "wanted rows of numbers", "");
+    if (format_.delimiter.empty()) format_.delimiter = delimiter_in(line, format_.decimal);
+    if (format_.header) {
+      for (const std::string_view cell : cells_of(line, format_.delimiter)) out_.channels.push_back(named(cell));
+      if (out_.channels.size() > 1 && out_.channels.back().name.empty()) out_.channels.pop_back();  // a delimiter at the end of the row
+    } else {
+      const std::size_t columns = cells_of(line, format_.delimiter).size();
+      for (std::size_t c = 0; c < columns; ++c) out_.channels.push_back({fmt::format("{}", c + 1), "", {}, "", 0, 0});
+      row(line);
+    }
+    while (next(line, true)) row(line);
+    if (out_.channels.empty() || out_.channels.front().value.empty()) refuse("the table has no rows", "wanted rows of numbers", "");
+    return std::move(out_);
+  }
+
+ private:
+  [[noreturn]] void refuse(const std::string& found, const std::string& wanted, const std::string& advice) const { throw InputError({out_.file, line_}, found, wanted, advice); }
+
+  bool next(std::string_view& line, bool skip_remarks) {
+    while (!text_.empty()) {
+      const std::size_t end = text_.find('\n');
+      line = text_.substr(0, end);
+      text_.remove_prefix(end == std::string_view::npos ? text_.size() : end + 1);
+      ++line_;
+      if (line.ends_with('\r')) line.remove_suffix(1);
+      const std::string_view content = trimmed(line);
+      if (!skip_remarks || !(content.empty() || content.front() == '#' || content.front() == '%')) return true;
+    }
+    return false;
+  }
+
+  void row(std::string_view line) {
+    const std::vector<std::string_view> cells = cells_of(line, format_.delimiter);
+    // A delimiter at the end of each row makes one empty cell too many.
+    const std::size_t count = cells.size() == out_.channels.size() + 1 && cells.back().empty() ? cells.size() - 1 : cells.size();
+    if (count != out_.channels.size())
+      refuse(fmt::format("the row has {} cells", count), fmt::format("wanted {}, as in the first", out_.channels.size()), "The mapping's [format] can name delimiter, decimal and skip_lines.");
+    for (std::size_t c = 0; c < count; ++c) out_.channels[c].value.push_back(number(cells[c], out_.channels[c].name));
+  }
+
+  double number(std::string_view cell, const std::string& column) const {
+    if (cell.empty()) return std::numeric_limits<double>::quiet_NaN();
+    std::string copy(cell);
+    if (format_.decimal == ",") std::replace(copy.begin(), copy.end(), ',', '.');
+    double value = 0;
+    if (read_number(copy.data(), copy.data() + copy.size(), value) != copy.data() + copy.size())
+      refuse(fmt::format("\"{}\" in the column \"{}\" is no number", cell.substr(0, 40), column), "wanted a number", "The mapping's [format] can name delimiter, decimal and skip_lines.");
+    return value;
+  }
+
+  std::string_view text_;
+  DelimitedFormat format_;
+  int line_ = 0;
+  Recording out_;
+};
+
+}  // namespace
+
+Recording read_delimited(std::string_view text, const std::string& file, const DelimitedFormat& format) { return Table(text, file, format).read(); }
+
+}  // namespace unrig

@@ -1,0 +1,208 @@
+#include "core/import/import.h"
+
+#include <algorithm>
+#include <cmath>
+#include <iterator>
+#include <optional>
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include "core/import/bridge.h"
+#include "core/import/delimited.h"
+#include "core/import/mat.h"
+#include "core/import/tdms.h"
+#include "core/import/uff.h"
+#include "core/run.h"
+#include "core/run_text.h"
+#include "core/text_file.h"
+#include "core/toml_table.h"
+#include "core/units.h"
+
+namespace unrig {
+namespace {
+
+constexpr const char* mapping_advice = "`unrig import --help` shows an example.";
+
+TomlTable parse_mapping(const std::string& text, const std::string& file) {
+  TomlTable mapping = TomlTable::parse(text, file, mapping_advice);
+  if (!mapping.has("unrig_import") || mapping.integer("unrig_import") != 1)
+    mapping.fail("unrig_import", "the file does not say that it is a mapping", "wanted `unrig_import = 1`", mapping_advice);
+  mapping.allow_only({"unrig_import", "run", "time", "column", "format"});
+  return mapping;
+}
+
+const RecordedChannel& source_of(const TomlTable& table, const Recording& recording) {
+  const std::string name = table.text("source");
+  std::vector<std::string> names;
+  for (const RecordedChannel& channel : recording.channels) {
+    if (channel.name == name) return channel;
+    names.push_back("\"" + channel.name + "\"");
+  }
+  constexpr std::size_t most = 40;
+  if (names.size() > most) names.resize(most);
+  table.fail("source", fmt::format("{} holds no channel \"{}\"", recording.file, name), fmt::format("wanted one of: {}", fmt::join(names, ", ")));
+}
+
+/// The channel's unit: the file's, or the mapping's where the file gives none. A contradiction is an error: one of the two is wrong.
+std::string unit_of(const TomlTable& table, const RecordedChannel& channel) {
+  const std::string told = table.text_or("unit", "");
+  if (!told.empty() && !channel.unit.empty() && told != channel.unit)
+    table.fail("unit", fmt::format("the unit is \"{}\" here and \"{}\" in the file, for \"{}\"", told, channel.unit, channel.name), "wanted the same, or none here",
+               "Where the file is wrong, mend it there: nobody can see it in the run file any more.");
+  const std::string unit = told.empty() ? channel.unit : told;
+  if (unit.empty()) table.fail("source", fmt::format("the file gives no unit for \"{}\"", channel.name), "wanted `unit`", "The unit of a number without dimension is \"1\".");
+  return unit;
+}
+
+double volts_or(const TomlTable& bridge, const char* key, double otherwise) { return bridge.has(key) ? bridge.quantity(key, "V") : otherwise; }
+
+Bridge read_bridge(const TomlTable& table) {
+  table.allow_only({"kind", "gauge_factor", "poisson", "excitation", "initial_voltage", "gauge_resistance", "lead_resistance", "shunt_gain", "shunt_reading", "shunt_expected"});
+  Bridge bridge;
+  try {
+    bridge.kind = bridge_from_name(table.text("kind"));
+  } catch (const std::invalid_argument& e) {
+    table.fail("kind", e.what(), "wanted one of these");
+  }
+  bridge.gauge_factor = table.number("gauge_factor");
+  bridge.poisson = table.number_or("poisson", 0);
+  bridge.excitation = table.quantity("excitation", "V");
+  bridge.initial_voltage = volts_or(table, "initial_voltage", 0);
+  bridge.gauge_resistance = table.has("gauge_resistance") ? table.quantity("gauge_resistance", "ohm") : 0;
+  bridge.lead_resistance = table.has("lead_resistance") ? table.quantity("lead_resistance", "ohm") : 0;
+  if (table.has("shunt_reading") != table.has("shunt_expected") || (table.has("shunt_gain") && table.has("shunt_reading")))
+    table.fail("shunt_gain", "the shunt calibration is incomplete or given twice", "wanted shunt_gain, or shunt_reading with shunt_expected");
+  bridge.shunt_gain = table.has("shunt_reading") ? table.quantity("shunt_expected", "V") / table.quantity("shunt_reading", "V") : table.number_or("shunt_gain", 1);
+  if (const std::string wrong = what_is_wrong(bridge); !wrong.empty()) table.fail("kind", wrong, "wanted a bridge that can scale a voltage");
+  return bridge;
+}
+
+struct Column {
+  std::string name, unit, source;
+  std::vector<double> value;
+};
+
+Column read_column(const TomlTable& table, const Recording& recording) {
+  table.allow_only({"name", "source", "unit", "raw", "bridge"});
+  const RecordedChannel& channel = source_of(table, recording);
+  Column column{table.text("name"), "", channel.name, channel.value};
+  if (column.name.empty() || column.name.find_first_of(",[]\"\n\r") != std::string::npos) table.fail("name", fmt::format("the name \"{}\"", column.name), "wanted a name without comma, bracket or quote");
+  const bool raw = table.boolean_or("raw", false);
+  if (!channel.raw.empty() && !raw)
+    table.fail("source", fmt::format("\"{}\" holds unscaled readings of a converter: {}", channel.name, channel.raw), "wanted physical values",
+               "`raw = true` takes them as counts, for a calibration in N per count.");
+  if (channel.raw.empty() && raw) table.fail("raw", fmt::format("\"{}\" is no raw channel", channel.name), "wanted `raw` only for unscaled readings");
+  if (raw && table.text_or("unit", "1") != "1") table.fail("unit", "counts have no unit", "wanted \"1\" or nothing", "The run's calibration says how much a count is.");
+  column.unit = raw ? "1" : unit_of(table, channel);
+  if (!table.has("bridge")) return column;
+  if (raw) table.fail("bridge", "counts are no volts", "wanted a scaled channel for a bridge");
+  const Bridge bridge = read_bridge(table.table("bridge"));
+  const UnitScale volts = unit_scale(column.unit, "V", table.place("bridge"), channel.name);
+  for (double& x : column.value) x = bridge.strain(volts(x));
+  column.unit = "1";
+  return column;
+}
+
+Column read_time(const TomlTable& mapping, const Recording& recording, const std::vector<Column>& columns) {
+  const std::size_t samples = columns.front().value.size();
+  Column time{"time", "s", "", {}};
+  const auto even = [&](double start, double step) {
+    for (std::size_t k = 0; k < samples; ++k) time.value.push_back(start + step * static_cast<double>(k));
+  };
+  if (!mapping.has("time")) {
+    const auto channel = std::find_if(recording.channels.begin(), recording.channels.end(), [&](const RecordedChannel& c) { return c.name == columns.front().source; });
+    if (!(channel->step > 0)) mapping.fail("time", "the file gives no sampling interval", "wanted a table [time] with a source or a rate", mapping_advice);
+    for (const Column& column : columns)
+      for (const RecordedChannel& other : recording.channels)
+        if (other.name == column.source && (other.step != channel->step || other.start != channel->start))
+          mapping.fail("column", fmt::format("\"{}\" and \"{}\" are sampled differently", channel->name, other.name), "wanted channels of one clock");
+    even(channel->start, channel->step);
+    return time;
+  }
+  const TomlTable table = mapping.table("time");
+  table.allow_only({"source", "unit", "rate", "start"});
+  if (table.has("source") == table.has("rate")) table.fail("source", "the table [time] has both or neither of source and rate", "wanted one of them");
+  if (table.has("rate")) {
+    even(table.has("start") ? table.quantity("start", "s") : 0, 1 / table.positive_quantity("rate", "Hz"));
+    return time;
+  }
+  const RecordedChannel& channel = source_of(table, recording);
+  time.value = channel.value;
+  time.unit = unit_of(table, channel);
+  time.source = channel.name;
+  return time;
+}
+
+std::string head(const TomlTable& mapping, const Recording& recording) {
+  std::string text = "# unrig_run = 1\n";
+  text += fmt::format("# # imported from {} ({})\n", toml_string(recording.file), recording.format);
+  const TomlTable run = mapping.table("run");
+  const std::initializer_list<std::string_view> keys{"name", "kind", "medium", "density", "speed", "calibration", "force_calibration"};
+  run.allow_only(keys);
+  for (const std::string_view key : keys)
+    if (run.has(key)) text += fmt::format("# {} = {}\n", key, toml_string(run.text(key)));
+  return text;
+}
+
+}  // namespace
+
+Imported import_recording(const Recording& recording, const std::string& mapping_text, const std::string& mapping_file) {
+  const TomlTable mapping = parse_mapping(mapping_text, mapping_file);
+  Imported out;
+  out.warnings = recording.warnings;
+  std::vector<Column> columns;
+  for (const TomlTable& table : mapping.tables("column")) {
+    columns.push_back(read_column(table, recording));
+    if (columns.back().value.size() != columns.front().value.size())
+      table.fail("source", fmt::format("\"{}\" has {} samples, \"{}\" has {}", columns.back().source, columns.back().value.size(), columns.front().source, columns.front().value.size()),
+                 "wanted channels of one length");
+    out.columns.push_back(fmt::format("{} [{}] from {}", columns.back().name, columns.back().unit, columns.back().source));
+  }
+  columns.insert(columns.begin(), read_time(mapping, recording, columns));
+  if (columns[0].value.size() != columns[1].value.size())
+    mapping.fail("time", fmt::format("the time has {} samples, \"{}\" has {}", columns[0].value.size(), columns[1].source, columns[1].value.size()), "wanted as many");
+  out.samples = columns[0].value.size();
+
+  out.text = head(mapping, recording);
+  for (std::size_t c = 0; c < columns.size(); ++c) out.text += fmt::format("{}{} [{}]", c == 0 ? "" : ",", columns[c].name, columns[c].unit);
+  out.text += '\n';
+  auto write = std::back_inserter(out.text);
+  for (std::size_t k = 0; k < out.samples; ++k)
+    for (std::size_t c = 0; c < columns.size(); ++c) {
+      const double x = columns[c].value[k];
+      if (std::isfinite(x)) fmt::format_to(write, "{:.12g}", x);
+      else out.text += "nan";
+      out.text += c + 1 < columns.size() ? ',' : '\n';
+    }
+  const Run run = parse_run(out.text, mapping_file);  // what it refuses must not be written
+  out.warnings.insert(out.warnings.end(), run.warnings.begin(), run.warnings.end());
+  return out;
+}
+
+Recording read_recording(const std::string& path, const std::string& mapping_text, const std::string& mapping_file) {
+  const std::string bytes = read_text(path);
+  const TomlTable mapping = parse_mapping(mapping_text, mapping_file);
+  const bool hdf5 = bytes.starts_with("\x89HDF\r\n") || (bytes.size() > 520 && bytes.compare(512, 4, "\x89HDF") == 0);
+  if (bytes.starts_with("TDSm")) return read_tdms(bytes, path);
+  if (bytes.starts_with("MATLAB") || hdf5) return read_mat(path);
+  const std::string_view first = std::string_view(bytes).substr(0, bytes.find('\n'));
+  if (first.find_first_not_of(" \r") != std::string_view::npos && first.substr(first.find_first_not_of(" ")).starts_with("-1") && first.size() <= 82 && first.find_first_of(",;\t") == std::string_view::npos)
+    return read_uff(bytes, path);
+  if (bytes.find('\0') != std::string::npos) throw InputError({path, 0}, "the file is binary, and in no format that is known here", "wanted TDMS, MATLAB 5 or 7.3, universal file 58, or text", "");
+  DelimitedFormat format;
+  if (mapping.has("format")) {
+    const TomlTable table = mapping.table("format");
+    table.allow_only({"delimiter", "decimal", "skip_lines", "header"});
+    format.delimiter = table.text_or("delimiter", "");
+    if (format.delimiter.size() > 1 && format.delimiter != "blanks") table.fail("delimiter", fmt::format("the delimiter is \"{}\"", format.delimiter), "wanted one character, or \"blanks\"");
+    format.decimal = table.text_or("decimal", ".");
+    if (format.decimal != "." && format.decimal != ",") table.fail("decimal", fmt::format("the decimal sign is \"{}\"", format.decimal), "wanted \".\" or \",\"");
+    if (format.decimal == format.delimiter) table.fail("decimal", "decimal sign and delimiter are the same", "wanted two different ones");
+    if (table.has("skip_lines")) format.skip_lines = table.integer("skip_lines");
+    format.header = table.boolean_or("header", true);
+  }
+  return read_delimited(bytes, path, format);
+}
+
+}  // namespace unrig

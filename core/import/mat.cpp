@@ -1,0 +1,103 @@
+#include "core/import/mat.h"
+
+#include <matio.h>
+
+#include <filesystem>
+#include <memory>
+
+#include <fmt/format.h>
+
+#include "core/error.h"
+
+namespace unrig {
+namespace {
+
+struct CloseMat {
+  void operator()(mat_t* file) const { Mat_Close(file); }
+};
+struct FreeVariable {
+  void operator()(matvar_t* variable) const { Mat_VarFree(variable); }
+};
+
+void be_quiet(int, char*) {}
+
+template <class T>
+void append(const void* data, std::size_t first, std::size_t count, std::vector<double>& values) {
+  const T* numbers = static_cast<const T*>(data) + first;
+  for (std::size_t k = 0; k < count; ++k) values.push_back(static_cast<double>(numbers[k]));
+}
+
+/// Numbers [first, first + count) of the variable; false where it holds none.
+bool numbers(const matvar_t& v, std::size_t first, std::size_t count, std::vector<double>& values) {
+  switch (v.class_type) {
+    case MAT_C_DOUBLE: return append<double>(v.data, first, count, values), true;
+    case MAT_C_SINGLE: return append<float>(v.data, first, count, values), true;
+    case MAT_C_INT8: return append<mat_int8_t>(v.data, first, count, values), true;
+    case MAT_C_UINT8: return append<mat_uint8_t>(v.data, first, count, values), true;
+    case MAT_C_INT16: return append<mat_int16_t>(v.data, first, count, values), true;
+    case MAT_C_UINT16: return append<mat_uint16_t>(v.data, first, count, values), true;
+    case MAT_C_INT32: return append<mat_int32_t>(v.data, first, count, values), true;
+    case MAT_C_UINT32: return append<mat_uint32_t>(v.data, first, count, values), true;
+    case MAT_C_INT64: return append<mat_int64_t>(v.data, first, count, values), true;
+    case MAT_C_UINT64: return append<mat_uint64_t>(v.data, first, count, values), true;
+    default: return false;
+  }
+}
+
+void take(const matvar_t& v, const std::string& name, int depth, Recording& out);
+
+void take_structure(const matvar_t& v, const std::string& name, int depth, Recording& out) {
+  const unsigned fields = Mat_VarGetNumberOfFields(const_cast<matvar_t*>(&v));
+  char* const* names = Mat_VarGetStructFieldnames(&v);
+  std::size_t elements = 1;
+  for (int d = 0; d < v.rank; ++d) elements *= v.dims[d];
+  if (!names || elements > 10000) return;
+  for (std::size_t i = 0; i < elements; ++i)
+    for (unsigned f = 0; f < fields; ++f)
+      if (const matvar_t* field = Mat_VarGetStructFieldByIndex(const_cast<matvar_t*>(&v), f, i))
+        take(*field, elements == 1 ? fmt::format("{}.{}", name, names[f]) : fmt::format("{}({}).{}", name, i + 1, names[f]), depth + 1, out);
+}
+
+void take(const matvar_t& v, const std::string& name, int depth, Recording& out) {
+  const auto leave_out = [&](const char* why) { out.warnings.push_back(fmt::format("{}: the variable {} is left out: {}", out.file, name, why)); };
+  if (depth > 8) return leave_out("its structures are nested more than eight deep");
+  if (v.class_type == MAT_C_STRUCT) return take_structure(v, name, depth, out);
+  if (v.isComplex) return leave_out("its numbers are complex");
+  if (v.rank != 2 || !v.dims) return leave_out("it is no vector or matrix");
+  const std::size_t rows = v.dims[0], columns = v.dims[1];
+  if (rows == 0 || columns == 0 || !v.data) return leave_out("it is empty");
+  const bool vector = rows == 1 || columns == 1, integers = v.class_type != MAT_C_DOUBLE && v.class_type != MAT_C_SINGLE;
+  // The data that were read, not the size that the file claims.
+  if (rows > v.nbytes / columns || rows * columns * static_cast<std::size_t>(std::max(v.data_size, 1)) > v.nbytes) return leave_out("it is cut off");
+  const std::size_t length = vector ? rows * columns : rows;
+  if (columns > 1000 && !vector) return leave_out("it has more than 1000 columns");
+  for (std::size_t c = 0; c < (vector ? 1 : columns); ++c) {
+    RecordedChannel channel{vector ? name : fmt::format("{}(:,{})", name, c + 1), "", {}, integers ? "the file gives integers and no scale" : "", 0, 0};
+    if (!numbers(v, c * length, length, channel.value)) return leave_out("it holds no numbers");
+    out.channels.push_back(std::move(channel));
+  }
+}
+
+}  // namespace
+
+Recording read_mat(const std::string& path) {
+  Mat_LogInitFunc("unrig", be_quiet);
+  const auto refuse = [&](const std::string& what) -> InputError { return {{path, 0}, what, "wanted a MATLAB file of version 5 or 7.3", "Save it again with `save(..., '-v7')`."}; };
+  std::error_code failure;
+  if (!std::filesystem::is_regular_file(path, failure)) throw refuse("the file cannot be read");
+  const std::unique_ptr<mat_t, CloseMat> file(Mat_Open(path.c_str(), MAT_ACC_RDONLY));
+  if (!file) throw refuse("this is no MATLAB file");
+  Recording out{path, "MAT", {}, {}};
+  while (const std::unique_ptr<matvar_t, FreeVariable> variable{Mat_VarReadNextInfo(file.get())}) {
+    const std::string name = variable->name ? variable->name : "";
+    if (Mat_VarReadDataAll(file.get(), variable.get()) != 0) {
+      out.warnings.push_back(fmt::format("{}: the variable {} cannot be read and is left out", path, name));
+      continue;
+    }
+    take(*variable, name, 0, out);
+  }
+  if (out.channels.empty()) throw refuse("the file holds no variable with real numbers");
+  return out;
+}
+
+}  // namespace unrig

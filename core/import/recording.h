@@ -1,0 +1,24 @@
+#pragma once
+#include <string>
+#include <vector>
+
+namespace unrig {
+
+/// One column of a laboratory's file as a reader hands it on: physical values, or counts that are marked as such.
+struct RecordedChannel {
+  std::string name;            ///< "group/channel", "struct.field", the header's name, "node:direction"
+  std::string unit;            ///< as the file says; empty where it does not
+  std::vector<double> value;
+  std::string raw;             ///< not empty: these are unscaled converter counts, and why they could not be scaled
+  double step = 0, start = 0;  ///< s: where the file gives the channel's own sampling; step 0: it does not
+};
+
+/// What a reader found in a file.
+struct Recording {
+  std::string file;
+  std::string format;  ///< "TDMS", "UFF 58", "MAT", "text"
+  std::vector<RecordedChannel> channels;
+  std::vector<std::string> warnings;  ///< what could not be read, and was left out
+};
+
+}  // namespace unrig

@@ -1,0 +1,63 @@
+// `unrig import` as it is called, on files that other programs wrote: SciPy's savemat and MATLAB's layouts of it, and text.
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cstdlib>
+#include <filesystem>
+
+#include "core/run.h"
+#include "tests/commands/run_unrig.h"
+
+namespace unrig {
+namespace {
+
+using test::Finished;
+using test::run_unrig;
+using test::TemporaryDirectory;
+using ::testing::HasSubstr;
+
+const std::string map = "unrig_import = 1\n[run]\nkind = \"step\"\ndensity = \"998 kg/m^3\"\nspeed = \"0.6 m/s\"\n[time]\nrate = \"500 Hz\"\n[[column]]\nname = \"gauge\"\nsource = \"";
+
+TEST(ImportCommand, ReadsWhatSciPyWrote) {
+  if (std::system("/usr/bin/python3 -c 'import scipy.io' 2>/dev/null") != 0) GTEST_SKIP() << "no SciPy on this machine; sample_data/setup.sh --optional installs it";
+  const TemporaryDirectory directory;
+  const std::string script = "import sys, numpy, scipy.io\n"
+                             "x = numpy.sin(numpy.arange(1000) / 7)\n"
+                             "for name, packed in (('plain', False), ('packed', True)):\n"
+                             "  scipy.io.savemat(sys.argv[1] + name + '.mat', {'x': x, 'data': {'load': x.astype('f4'), 'n': numpy.arange(1000, dtype='i2')}}, do_compression=packed)\n";
+  ASSERT_EQ(std::system(("/usr/bin/python3 " + directory.file("write.py", script) + " " + directory.path("")).c_str()), 0);
+  for (const std::string name : {"plain.mat", "packed.mat"})
+    for (const std::string source : {"x", "data.load"}) {
+      const Finished finished = run_unrig(directory, {"import", directory.path(name), "--map", directory.file("map.toml", map + source + "\"\nunit = \"N\"\n"), "-o", directory.path("run.csv")});
+      ASSERT_EQ(finished.status, 0) << finished.err;
+      const unrig::Run run = read_run(directory.path("run.csv"));
+      ASSERT_EQ(run.samples(), 1000);
+      for (Eigen::Index k = 0; k < 1000; ++k) EXPECT_NEAR(run.channel("gauge").value[k], std::sin(static_cast<double>(k) / 7), source == "x" ? 1e-12 : 6e-8);  // digits written; single precision
+    }
+  const Finished listed = run_unrig(directory, {"import", directory.path("packed.mat"), "--list"});
+  EXPECT_THAT(listed.out, HasSubstr("data.n"));
+  EXPECT_THAT(listed.out, HasSubstr("UNSCALED"));
+}
+
+TEST(ImportCommand, RefusesAndLeavesNothingBehind) {
+  const TemporaryDirectory directory;
+  const std::string mapping = directory.file("map.toml", map + "F\"\nunit = \"N\"\n");
+  const std::vector<std::pair<std::string, std::string>> bad{{directory.file("text.txt", "F\n1\nx\n2\n"), "\"x\""},
+                                                             {directory.file("other.txt", "G\n1\n2\n3\n"), "no channel \"F\""},
+                                                             {directory.file("short.txt", "F\n1\n2\n"), "rows"},
+                                                             {directory.file("binary.bin", std::string("\x7f\0\1\2", 4)), "binary"},
+                                                             {directory.file("cut.tdms", "TDSm"), "TDMS"},
+                                                             {directory.file("cut.mat", "MATLAB 5.0"), "MATLAB"},
+                                                             {directory.file("cut.uff", "    -1\n    58\nname\n"), "cut.uff:3"}};
+  for (const auto& [file, complaint] : bad) {
+    const Finished finished = run_unrig(directory, {"import", file, "--map", mapping, "-o", directory.path("run.csv")});
+    EXPECT_EQ(finished.status, 2) << file;
+    EXPECT_THAT(finished.err, HasSubstr(complaint)) << file;
+    EXPECT_FALSE(std::filesystem::exists(directory.path("run.csv"))) << file;
+  }
+  EXPECT_EQ(run_unrig(directory, {"import", bad[0].first}).status, 2);
+}
+
+}  // namespace
+}  // namespace unrig

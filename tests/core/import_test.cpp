@@ -1,0 +1,189 @@
+// The mapping from a laboratory's file to a run file, text tables, and MATLAB files written by libmatio.
+
+#include "core/import/import.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <matio.h>
+
+#include <cmath>
+#include <map>
+
+#include "core/error.h"
+#include "core/import/delimited.h"
+#include "core/import/mat.h"
+#include "core/run.h"
+#include "tests/support/temporary_directory.h"
+
+namespace unrig {
+namespace {
+
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+using test::TemporaryDirectory;
+using Values = std::vector<double>;
+
+template <class Call>
+std::string complaint(Call call) {
+  try {
+    call();
+  } catch (const InputError& e) {
+    return e.what();
+  }
+  return "nothing";
+}
+
+const std::string head = "unrig_import = 1\n[run]\nkind = \"step\"\nmedium = \"water\"\ndensity = \"1 g/cm^3\"\nspeed = \"0.6 m/s\"\ncalibration = \"4.4 N/V\"\n";
+
+Recording recording() {
+  Recording r{"lab.tdms", "TDMS", {}, {}};
+  r.channels.push_back({"angle", "deg", {0, 1, 2, 3}, "", 0.01, 0});
+  r.channels.push_back({"bridge", "mV", {1, 2, std::nan(""), 4}, "", 0.01, 0});
+  r.channels.push_back({"counts", "", {10, 20, 30, 40}, "the file gives readings of the converter and no scale", 0.01, 0});
+  r.channels.push_back({"clock", "", {0, 10, 20, 30}, "", 0, 0});
+  return r;
+}
+
+TEST(Import, WritesARunThatReadsBack) {
+  const std::string map = head + "[[column]]\nname = \"alpha\"\nsource = \"angle\"\n[[column]]\nname = \"gauge\"\nsource = \"bridge\"\n";
+  const Imported imported = import_recording(recording(), map, "map.toml");
+  const unrig::Run run = parse_run(imported.text, "run.csv");
+  EXPECT_EQ(run.dt, 0.01);
+  EXPECT_DOUBLE_EQ(run.density, 1000);
+  EXPECT_DOUBLE_EQ(run.channel("alpha").value[3], 3 * std::acos(-1) / 180);
+  EXPECT_NEAR(run.channel("gauge").value[3], 4e-3 * 4.4, 1e-15);
+  EXPECT_EQ(run.channel("gauge").missing, 1u);
+  EXPECT_EQ(imported.samples, 4u);
+}
+
+TEST(Import, TakesTheTimeFromAChannelOrARate) {
+  const std::string column = "[[column]]\nname = \"gauge\"\nsource = \"bridge\"\n";
+  EXPECT_EQ(parse_run(import_recording(recording(), head + "[time]\nsource = \"clock\"\nunit = \"ms\"\n" + column, "m").text, "r").dt, 0.01);
+  EXPECT_EQ(parse_run(import_recording(recording(), head + "[time]\nrate = \"200 Hz\"\nstart = \"1 s\"\n" + column, "m").text, "r").start, 1);
+  EXPECT_THAT(complaint([&] { import_recording(recording(), head + "[time]\nsource = \"clock\"\n" + column, "m"); }), HasSubstr("no unit"));
+  EXPECT_THAT(complaint([&] { import_recording(recording(), head + "[time]\nsource = \"clock\"\nrate = \"1 Hz\"\n" + column, "m"); }), HasSubstr("both or neither"));
+  Recording untimed = recording();
+  for (RecordedChannel& c : untimed.channels) c.step = 0;
+  EXPECT_THAT(complaint([&] { import_recording(untimed, head + column, "m"); }), HasSubstr("no sampling interval"));
+}
+
+TEST(Import, NeverTakesUnscaledReadingsForPhysicalValues) {
+  const std::string column = "[[column]]\nname = \"gauge\"\nsource = \"counts\"\n";
+  std::string map = head + column;
+  EXPECT_THAT(complaint([&] { import_recording(recording(), map, "m"); }), HasSubstr("unscaled readings"));
+  EXPECT_THAT(complaint([&] { import_recording(recording(), map + "unit = \"V\"\n", "m"); }), HasSubstr("unscaled readings"));
+  EXPECT_THAT(complaint([&] { import_recording(recording(), map + "raw = true\nunit = \"V\"\n", "m"); }), HasSubstr("counts have no unit"));
+  map.replace(map.find("4.4 N/V"), 7, "0.01 N");
+  EXPECT_NEAR(parse_run(import_recording(recording(), map + "raw = true\n", "m").text, "r").channel("gauge").value[3], 0.4, 1e-15);
+  EXPECT_THAT(complaint([&] { import_recording(recording(), head + "[[column]]\nname = \"gauge\"\nsource = \"bridge\"\nraw = true\n", "m"); }), HasSubstr("no raw channel"));
+}
+
+TEST(Import, ScalesABridgeThatTheMappingDescribes) {
+  std::string map = head + "[[column]]\nname = \"gauge\"\nsource = \"bridge\"\nbridge.kind = \"full-1\"\nbridge.gauge_factor = 2.0\nbridge.excitation = \"5 V\"\n";
+  map.replace(map.find("4.4 N/V"), 7, "1e6 N");
+  EXPECT_NEAR(parse_run(import_recording(recording(), map, "m").text, "r").channel("gauge").value[3], -4e-3 / 5 / 2 * 1e6, 1e-9);
+  EXPECT_NEAR(parse_run(import_recording(recording(), map + "bridge.shunt_reading = \"2 mV\"\nbridge.shunt_expected = \"2.2 mV\"\n", "m").text, "r").channel("gauge").value[3], -440, 1e-9);
+  EXPECT_THAT(complaint([&] { import_recording(recording(), map + "bridge.shunt_reading = \"2 mV\"\n", "m"); }), HasSubstr("incomplete"));
+}
+
+TEST(Import, NamesWhatIsWrongInAMapping) {
+  const auto with = [](const std::string& text) { return complaint([&] { import_recording(recording(), text, "map.toml"); }); };
+  EXPECT_THAT(with("[run]\n"), HasSubstr("unrig_import = 1"));
+  EXPECT_THAT(with(head + "[[column]]\nname = \"gauge\"\nsource = \"brigde\"\n"), HasSubstr("\"bridge\""));
+  EXPECT_THAT(with(head + "[[column]]\nname = \"gauge\"\nsource = \"bridge\"\nunit = \"V\"\n"), HasSubstr("\"mV\" in the file"));
+  EXPECT_THAT(with(head + "[[column]]\nname = \"gauge\"\nsource = \"bridge\"\ncolour = 1\n"), HasSubstr("column[1].colour"));
+  EXPECT_THAT(with(head + "[[column]]\nname = \"ga,uge\"\nsource = \"bridge\"\n"), HasSubstr("without comma"));
+  Recording uneven = recording();
+  uneven.channels[1].value.pop_back();
+  EXPECT_THAT(complaint([&] { import_recording(uneven, head + "[[column]]\nname = \"alpha\"\nsource = \"angle\"\n[[column]]\nname = \"gauge\"\nsource = \"bridge\"\n", "m"); }), HasSubstr("3 samples"));
+}
+
+TEST(Delimited, FindsDelimiterAndUnits) {
+  const Values force{1.5, -2, 3e3};
+  for (const auto& [text, format] : std::vector<std::pair<std::string, DelimitedFormat>>{
+           {"Time [s],Force (N)\n0,1.5\n1,-2\n2,3e3\n", {}},
+           {"Time [s];Force [N];\r\n0,0;1,5;\r\n1,0;-2;\r\n2,0;3e3;\r\n", {"", ",", 0, true}},
+           {"Time [s]\tForce [N]\n0\t1.5\n1\t-2\n2\t3e3", {}},
+           {"Logger 7\n\nTime[s]  Force[N]\n 0  1.5\n 1  -2\n# remark\n 2  3e3\n", {"", ".", 2, true}},
+           {"\xEF\xBB\xBF\"Time [s]\",\"Force [N]\"\n\"0\",\"1.5\"\n1,-2\n2,3e3\n", {}}}) {
+    const Recording r = read_delimited(text, "f", format);
+    ASSERT_EQ(r.channels.size(), 2u) << text;
+    EXPECT_EQ(r.channels[1].name, "Force");
+    EXPECT_EQ(r.channels[1].unit, "N");
+    EXPECT_EQ(r.channels[1].value, force) << text;
+  }
+  const Recording bare = read_delimited("1 2\n3 nan\n", "f", {"", ".", 0, false});
+  EXPECT_EQ(bare.channels[0].name, "1");
+  EXPECT_EQ(bare.channels[0].value, (Values{1, 3}));
+  EXPECT_TRUE(std::isnan(bare.channels[1].value[1]));
+}
+
+TEST(Delimited, RefusesWhatIsNoTable) {
+  EXPECT_THAT(complaint([] { read_delimited("", "f"); }), HasSubstr("no table"));
+  EXPECT_THAT(complaint([] { read_delimited("a,b\n", "f"); }), HasSubstr("no rows"));
+  EXPECT_THAT(complaint([] { read_delimited("a,b\n1,2\n3\n", "f.txt"); }), HasSubstr("f.txt:3"));
+  EXPECT_THAT(complaint([] { read_delimited("a,b\n1,two\n", "f"); }), HasSubstr("\"two\""));
+  EXPECT_THAT(complaint([] { read_delimited("a;b\n1,5;2\n", "f"); }), HasSubstr("decimal"));
+}
+
+void write_mat(const std::string& path, mat_ft version) {
+  mat_t* file = Mat_CreateVer(path.c_str(), nullptr, version);
+  ASSERT_NE(file, nullptr);
+  double force[]{1, 2, 3}, matrix[]{1, 2, 3, 10, 20, 30};
+  std::int16_t counts[]{7, 8, 9};
+  std::size_t column[]{3, 1}, table[]{3, 2}, one[]{1, 1};
+  const auto write = [&](matvar_t* v) {
+    EXPECT_EQ(Mat_VarWrite(file, v, version == MAT_FT_MAT5 ? MAT_COMPRESSION_ZLIB : MAT_COMPRESSION_NONE), 0);
+    Mat_VarFree(v);
+  };
+  write(Mat_VarCreate("force", MAT_C_DOUBLE, MAT_T_DOUBLE, 2, column, force, 0));
+  write(Mat_VarCreate("m", MAT_C_DOUBLE, MAT_T_DOUBLE, 2, table, matrix, 0));
+  write(Mat_VarCreate("counts", MAT_C_INT16, MAT_T_INT16, 2, column, counts, 0));
+  const char* fields[]{"gauge"};
+  matvar_t* structure = Mat_VarCreateStruct("data", 2, one, fields, 1);
+  Mat_VarSetStructFieldByName(structure, "gauge", 0, Mat_VarCreate(nullptr, MAT_C_DOUBLE, MAT_T_DOUBLE, 2, column, force, 0));
+  write(structure);
+  Mat_Close(file);
+}
+
+TEST(Mat, ReadsBothVersions) {
+  const TemporaryDirectory directory;
+  for (const mat_ft version : {MAT_FT_MAT5, MAT_FT_MAT73}) {
+    const std::string path = directory.path("lab.mat");
+    write_mat(path, version);
+    const Recording r = read_mat(path);
+    ASSERT_EQ(r.channels.size(), 5u);
+    std::map<std::string, RecordedChannel> by_name;  // HDF5 sorts them
+    for (const RecordedChannel& c : r.channels) by_name[c.name] = c;
+    EXPECT_EQ(by_name["force"].value, (Values{1, 2, 3}));
+    EXPECT_THAT(by_name["force"].raw, IsEmpty());
+    EXPECT_EQ(by_name["m(:,2)"].value, (Values{10, 20, 30}));
+    EXPECT_EQ(by_name["counts"].value, (Values{7, 8, 9}));
+    EXPECT_THAT(by_name["counts"].raw, HasSubstr("integers"));
+    EXPECT_EQ(by_name["data.gauge"].value, (Values{1, 2, 3}));
+  }
+}
+
+TEST(Mat, RefusesWhatCannotBeRead) {
+  const TemporaryDirectory directory;
+  EXPECT_THAT(complaint([&] { read_mat(directory.path("absent.mat")); }), HasSubstr("cannot be read"));
+  EXPECT_THAT(complaint([&] { read_mat(directory.file("text.mat", "MATLAB is not here")); }), HasSubstr("no MATLAB file"));
+  write_mat(directory.path("whole.mat"), MAT_FT_MAT5);
+  const std::string whole = [&] {
+    std::ifstream file(directory.path("whole.mat"), std::ios::binary);
+    return std::string(std::istreambuf_iterator<char>(file), {});
+  }();
+  for (const std::size_t length : {whole.size() / 2, std::size_t(128), std::size_t(140)}) {
+    const std::string path = directory.file("cut.mat", whole.substr(0, length));
+    const std::string said = complaint([&] {
+      const Recording r = read_mat(path);
+      for (const RecordedChannel& c : r.channels) EXPECT_EQ(c.value.size(), 3u) << c.name;  // what is handed on is whole
+    });
+    if (length <= 140) {
+      EXPECT_THAT(said, HasSubstr("no variable"));
+    }
+  }
+}
+
+}  // namespace
+}  // namespace unrig
