@@ -43,6 +43,8 @@ std::string listed(const json& names) {
 void add_verdicts(ReportPage& page, const json& result, const std::string& about) {
   const json mismatch = member(result, "mismatch", json::object()), missing = member(result, "missing", json::array());
   const double p = number_of(mismatch, "p_value");
+  if (const std::string verdict = text_of(result, "verdict"); !verdict.empty())  // in the words of `unrig diagnose` itself
+    return page.add_verdict(!mismatch.value("found", false) ? Tone::good : missing.empty() || result.value("unexplained", false) ? Tone::open : Tone::bad, verdict, about);
   const std::string chance = std::isfinite(p) ? fmt::format(" (p = {:.2g})", p) : "";
   if (!mismatch.value("found", false)) {
     page.add_verdict(Tone::good, "Nothing is missing: the rig model explains these recordings" + chance + ".", about);
@@ -77,8 +79,8 @@ void add_places(ReportPage& page, const json& mismatch) {
 void add_ranking(ReportPage& page, const json& ranking) {
   std::vector<std::vector<std::string>> rows;
   for (const json& r : ranking)
-    rows.push_back({text_of(r, "effect"), plain(number_of(r, "score"), 4), plain(number_of(r, "p_value"), 3), plain(number_of(r, "delta_bic"), 5)});
-  if (!rows.empty()) page.add_table("Ranking of the effects", {"effect", "score", "p-value", "change of BIC"}, rows, "The more negative the change of BIC, the more the effect explains for its parameters.");
+    rows.push_back({text_of(r, "effect"), plain(number_of(r, "score"), 4), plain(number_of(r, "reduced_chi2"), 4), plain(number_of(r, "delta_bic"), 5), plain(number_of(r, "probability"), 3)});
+  if (!rows.empty()) page.add_table("Ranking of the effects", {"effect", "score", "reduced chi-square", "change of BIC", "probability"}, rows, "The more negative the change of BIC, the more the effect explains for its parameters.");
 }
 
 void add_missing(ReportPage& page, const json& missing) {
@@ -90,6 +92,16 @@ void add_missing(ReportPage& page, const json& missing) {
       rows.push_back({effect, text_of(p, "name"), with_error(number_of(p, "value"), number_of(p, "std_error")), text_of(p, "unit") == "1" ? "" : text_of(p, "unit")});
   }
   if (!rows.empty()) page.add_table("Parameters of what was missing", {"effect", "parameter", "value ± one standard error", "unit"}, rows);
+}
+
+/// What the rig's parameters would have been without the effect.
+void add_price(ReportPage& page, const json& shifts) {
+  std::vector<std::vector<std::string>> rows;
+  for (const json& s : shifts) {
+    const double with = number_of(s, "with"), without = number_of(s, "without"), error = number_of(s, "std_error");
+    rows.push_back({text_of(s, "name"), file_name(text_of(s, "run")), plain(without, 6), with_error(with, error), text_of(s, "unit") == "1" ? "" : text_of(s, "unit"), plain((without - with) / error, 3)});
+  }
+  if (!rows.empty()) page.add_table("The price of not knowing", {"parameter", "of run", "without the effect", "with it, ± one standard error", "unit", "off, in standard errors"}, rows);
 }
 
 void add_improvement(ReportPage& page, const json& improvement) {
@@ -202,6 +214,7 @@ void add_diagnosis(ReportPage& page, const json& result, const std::string& path
   add_ranking(page, member(result, "ranking", json::array()));
   const json improvement = member(result, "improvement", json::object());
   add_improvement(page, improvement);
+  add_price(page, member(result, "price_of_ignorance", json::array()));
   for (const json& run : member(improvement, "runs", json::array())) add_run(page, result, run);
 }
 

@@ -42,7 +42,7 @@ inline nlohmann::json made_up_diagnosis() {
           {"missing", {{{"effect", "quadratic-drag"}, {"probability", 0.99}, {"equation", "F = -c v |v|"}, {"parameters", {{{"name", "c"}, {"value", 1.2}, {"std_error", 0.01}, {"unit", "N s^2/m^2"}}}}}}},
           {"equivalent", json::array({json::array({"tank-wave", "vortex-shedding"})})},
           {"unexplained", false},
-          {"ranking", {{{"effect", "quadratic-drag"}, {"score", 1.0}, {"p_value", 1e-8}, {"delta_bic", -400}}}},
+          {"ranking", {{{"effect", "quadratic-drag"}, {"score", 1.0}, {"reduced_chi2", 1.1}, {"delta_bic", -400}, {"probability", 0.99}}}},
           {"improvement",
            {{"bic_before", 1000},
             {"bic_after", 600},

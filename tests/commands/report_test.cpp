@@ -103,6 +103,10 @@ TEST(Report, ShowsADiagnosisOfTheMandatoryFieldsAlone) {
   const std::string output = directory.path("report.html");
   ASSERT_EQ(run_unrig(directory, {"report", directory.file("diagnosis.json", nothing.dump()), "-o", output}).status, 0);
   EXPECT_EQ(page_data(output)["verdicts"][0]["text"], "Nothing is missing: the rig model explains these recordings (p = 0.4).");
+  nothing["verdict"] = "All is explained.";
+  ASSERT_EQ(run_unrig(directory, {"report", directory.file("diagnosis.json", nothing.dump()), "-o", output}).status, 0);
+  EXPECT_EQ(page_data(output)["verdicts"][0]["text"], "All is explained.");
+  nothing.erase("verdict");
   nothing["mismatch"]["found"] = true;
   ASSERT_EQ(run_unrig(directory, {"report", directory.file("diagnosis.json", nothing.dump()), "-o", output}).status, 0);
   EXPECT_EQ(page_data(output)["verdicts"][0]["text"], "Something is missing (p = 0.4), and no known effect explains it.");
