@@ -199,6 +199,7 @@ Conditions conditions_of(const Run& run) {
   Conditions c;
   c.density = run.density;
   c.speed = run.speed;
+  c.nyquist = run.dt > 0 ? 0.5 / run.dt : 0;
   c.prescribed_pitch = run.find("alpha") != nullptr && run.kind == RunKind::step;
   c.force = run.find("force") != nullptr;
   c.mount = run.find("mount_velocity") != nullptr || run.find("mount_acceleration") != nullptr;

@@ -26,6 +26,7 @@ struct Parameter {
 struct Conditions {
   double density = 0;  ///< kg/m^3
   double speed = 0;    ///< m/s; 0: no circulation
+  double nyquist = 0;  ///< Hz, half the sampling rate; 0: not known
   bool prescribed_pitch = false;  ///< carry angle, rate and acceleration of the shaft as states
   bool force = false;             ///< a measured force at the calibration station
   bool mount = false;             ///< the mount moves: inputs velocity and acceleration

@@ -89,7 +89,9 @@ FitResult fit(const FitProblem& problem) {
   const auto model = std::make_shared<const AeroelasticModel>(model_of(problem.rig, problem.runs, problem.circulation));
   const auto complete = problem.effects.empty() ? model : std::make_shared<const AeroelasticModel>(model_of(problem.rig, problem.runs, problem.circulation, problem.effects));
   check_names(*complete, problem);
-  Arrival arrival = arrive(problem, model);
+  ArrivalEffort effort;
+  if (!problem.effects.empty()) effort = {false, 10};  // without them the records will not be explained, however long the search
+  Arrival arrival = arrive(problem, model, effort);
   if (!problem.effects.empty()) arrival = go_on_with_effects(problem, arrival, complete);
   FitResult result = describe_fit(arrival, problem);
   result.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();

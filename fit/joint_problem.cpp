@@ -95,7 +95,7 @@ JointProblem::Summary JointProblem::solve(const SolveOptions& options) {
   search.relative_change = options.tolerance;
   // promised / chi2 < tolerance is a step of sqrt(tolerance dof) standard errors; a whole record deserves a hundredth of one.
   search.precision = std::sqrt(options.tolerance * std::max(1.0, problem.degrees_of_freedom));
-  if (!options.prior) search.precision = std::min(search.precision, 0.01);
+  if (!options.prior) search.precision = std::min(search.precision, options.precision);
   search.effort = options.restarts ? LeastSquaresOptions::Effort::until_arrived : LeastSquaresOptions::Effort::once;
   search.evaluations = options.most_evaluations;
   const LeastSquaresResult result = solve_least_squares(problem, search);

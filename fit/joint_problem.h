@@ -38,6 +38,7 @@ class JointProblem {
     bool prior = false;   ///< hold unknowns weakly near their present values, while a short window determines only some of them
     int iterations = 30;
     double tolerance = 1e-7;  ///< the search ends when the next step promises to lower chi-square by less than this fraction of it
+    double precision = 0.01;  ///< and when it is shorter than this many standard errors
     bool restarts = false;    ///< where it does not arrive, try other ways (LeastSquaresOptions::Effort::until_arrived)
     int most_evaluations = 400;
   };

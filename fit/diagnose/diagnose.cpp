@@ -21,7 +21,8 @@ constexpr double explained = 1.15;     // residual power over noise power of a m
 constexpr double nearly_all = 0.97;    // share of the excess that an effect must remove to be named where something remains
 constexpr double nearly_explained = 10;
 constexpr double decisive = 10;        // BIC: very strong evidence (Kass and Raftery 1995)
-constexpr std::size_t most_refits = 5, most_effects = 3;
+constexpr std::size_t most_refits = 5, most_effects = 3, most_in_full = 2;
+constexpr std::size_t few = 7;  // candidates that are all worth a fit
 
 /// Runs `work(0..count)` on so many threads.
 template <class Work>
@@ -61,11 +62,20 @@ std::vector<Trial> try_one_more(const DiagnoseProblem& problem, const FitProblem
   std::sort(prepared.begin(), prepared.end(), [](const auto& a, const auto& b) { return a->score > b->score; });
   const double best_score = prepared.empty() ? 0 : prepared.front()->score;
   std::vector<Trial> promising;
-  for (const auto& trial : prepared)
-    if (effect(trial->effects.back()).parameters.empty() || (promising.size() < most_refits && trial->score > 0.25 * best_score)) promising.push_back(std::move(*trial));  // what has no parameters promises nothing
-  in_parallel(promising.size(), problem.threads, [&](std::size_t i) { fit_fully(promising[i]); });
+  for (const auto& trial : prepared) {
+    const bool promises_nothing = effect(trial->effects.back()).parameters.empty();  // it may hold all the same
+    const bool promises = promising.size() < most_refits && trial->score > 0.25 * best_score;
+    if (prepared.size() <= few || promises_nothing || promises) promising.push_back(std::move(*trial));
+  }
+  // A few rounds for all, the rest for those that are ahead.
+  in_parallel(promising.size(), problem.threads, [&](std::size_t i) { fit_fully(promising[i], 2); });
+  std::sort(promising.begin(), promising.end(), [](const Trial& a, const Trial& b) { return a.reduced_chi2() < b.reduced_chi2(); });
+  const std::size_t ahead = std::min(promising.size(), most_in_full);
+  in_parallel(ahead, problem.threads, [&](std::size_t i) { fit_fully(promising[i], 6); });
   if (std::none_of(promising.begin(), promising.end(), [](const Trial& t) { return t.reduced_chi2() < explained; }))
-    in_parallel(promising.size(), problem.threads, [&](std::size_t i) { fit_from_first_guesses(fit_problem, promising[i]); });
+    in_parallel(promising.size(), problem.threads, [&](std::size_t i) {
+      if (i < ahead || effect(promising[i].effects.back()).parameters.empty()) fit_from_first_guesses(fit_problem, promising[i]);
+    });
   std::sort(promising.begin(), promising.end(), [](const Trial& a, const Trial& b) { return bic_difference(a, b) < 0; });
   return promising;
 }
@@ -76,7 +86,7 @@ Trial without_superfluous(const FitProblem& fit_problem, Trial trial) {
     Strings fewer = trial.effects;
     fewer.erase(fewer.begin() + static_cast<std::ptrdiff_t>(k));
     Trial smaller = prepare(fit_problem, trial, fewer);
-    fit_fully(smaller);
+    fit_fully(smaller, 6);
     if (bic_difference(smaller, trial) < decisive)
       trial = std::move(smaller);
     else

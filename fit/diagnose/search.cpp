@@ -56,8 +56,9 @@ void anneal(Arrival& arrival, int rounds) {
   for (int round = 0; round < rounds; ++round) {
     JointProblem::SolveOptions options;
     options.iterations = 8;
-    options.tolerance = 1e-4;
-    options.most_evaluations = 25;
+    options.tolerance = 1e-3;
+    options.precision = 0.5;  // candidates differ by more than half a standard error, or cannot be told apart
+    options.most_evaluations = 12;
     solve(arrival, options);
     if (!temper(arrival.joint)) return;
   }
@@ -121,8 +122,8 @@ Trial prepare(const FitProblem& problem, const Trial& base, const std::vector<st
   return trial;
 }
 
-void fit_fully(Trial& trial) {
-  anneal(trial.arrival, 6);
+void fit_fully(Trial& trial, int rounds) {
+  anneal(trial.arrival, rounds);
   measure(trial);
 }
 

@@ -29,8 +29,8 @@ Trial fit_baseline(const FitProblem& problem);
 /// One linear step from `base` with `effects` (those of base and one more): what would it remove?
 Trial prepare(const FitProblem& problem, const Trial& base, const std::vector<std::string>& effects);
 
-/// Fits a prepared trial with everything free, while the weights of the runs return to those of their noise.
-void fit_fully(Trial& trial);
+/// Fits a prepared trial with everything free, while the weights of the runs return to those of their noise, in so many rounds.
+void fit_fully(Trial& trial, int rounds);
 
 /// The same once more with exact tangents for the motion (RunResidual::search_exactly): for nonlinear effects that nearly explain the runs.
 void fit_exactly(Trial& trial);

@@ -37,6 +37,11 @@ void expect_recovered(const std::string& name, const std::string& effect_id, con
     const auto known = truth.find(p.name);
     if (known == truth.end()) continue;
     ++seen;
+    // Slow rigs behind a low-pass hardly show the damping of their torsion: then the fit must say so. Everything else must be there.
+    if (!p.identified) {
+      EXPECT_EQ(p.name, "torsion.damping_ratio") << p.advice;
+      continue;
+    }
     EXPECT_LT(std::abs(p.value - known->second), 3 * p.std_error) << p.name << ": " << p.value << " +/- " << p.std_error << ", truth " << known->second;
   }
   EXPECT_EQ(seen, truth.size());
