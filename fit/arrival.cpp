@@ -49,7 +49,7 @@ std::vector<Index> growing_horizons(const std::vector<Run>& runs) {
 }
 
 /// Follows the growing window through the stages [first, last) from the values of the joint fit.
-void follow(Arrival& arrival, const FitProblem& problem, const std::vector<Index>& horizons, std::size_t first, std::size_t last, int iterations) {
+void follow(Arrival& arrival, const FitProblem& problem, const std::vector<Index>& horizons, std::size_t first, std::size_t last, const ArrivalEffort& effort) {
   for (std::size_t stage = first; stage < last; ++stage) {
     JointProblem longer = make_joint(*arrival.model, problem.runs, arrival.windows, horizons[stage]);
     carry_over(arrival.joint, longer);
@@ -59,7 +59,9 @@ void follow(Arrival& arrival, const FitProblem& problem, const std::vector<Index
     JointProblem::SolveOptions options;
     options.prior = !whole;
     options.tolerance = whole ? 1e-7 : 1e-2;
-    options.iterations = whole ? iterations : 12;
+    options.iterations = whole ? effort.iterations : std::min(12, effort.iterations);
+    options.precision = effort.precision;
+    options.most_evaluations = effort.evaluations;
     solve(arrival, options);
   }
 }
@@ -67,7 +69,7 @@ void follow(Arrival& arrival, const FitProblem& problem, const std::vector<Index
 constexpr double explained = 2;  // reduced chi-square of a record that a model can be said to follow
 
 /// Once more from stiffnesses around the first guess; the best after the early stages goes on.
-Arrival try_other_starts(const Arrival& start, const FitProblem& problem, const std::vector<Index>& horizons, int iterations) {
+Arrival try_other_starts(const Arrival& start, const FitProblem& problem, const std::vector<Index>& horizons, const ArrivalEffort& effort) {
   const std::size_t early = std::min<std::size_t>(2, horizons.size() - 1);
   std::optional<Arrival> best;
   double least = std::numeric_limits<double>::infinity();
@@ -81,13 +83,13 @@ Arrival try_other_starts(const Arrival& start, const FitProblem& problem, const 
         u.value = std::clamp(u.value * (name.starts_with("torsion") ? torsion : normal), other.joint.parameter(u).lower, other.joint.parameter(u).upper);
       }
       tell(problem, "trying other starts");
-      follow(other, problem, horizons, 0, early, iterations);
+      follow(other, problem, horizons, 0, early, effort);
       if (const double chi2 = other.joint.chi2(); chi2 < least || !best) {
         least = chi2;
         best = other;
       }
     }
-  follow(*best, problem, horizons, early, horizons.size(), iterations);
+  follow(*best, problem, horizons, early, horizons.size(), effort);
   return *best;
 }
 
@@ -95,9 +97,9 @@ Arrival try_other_starts(const Arrival& start, const FitProblem& problem, const 
 Arrival grow(Arrival start, const FitProblem& problem, const ArrivalEffort& effort) {
   const std::vector<Index> horizons = growing_horizons(problem.runs);
   Arrival arrival = start;
-  follow(arrival, problem, horizons, 0, horizons.size(), effort.iterations);
+  follow(arrival, problem, horizons, 0, horizons.size(), effort);
   if (!effort.other_starts || horizons.size() < 2 || arrival.reduced_chi2() < explained) return arrival;
-  Arrival other = try_other_starts(start, problem, horizons, effort.iterations);
+  Arrival other = try_other_starts(start, problem, horizons, effort);
   return other.reduced_chi2() < arrival.reduced_chi2() ? other : arrival;
 }
 

@@ -27,6 +27,8 @@ struct Arrival {
 struct ArrivalEffort {
   bool other_starts = true;  ///< where the record stays unexplained, once more from stiffnesses around the first guess
   int iterations = 50;       ///< over the whole record
+  double precision = 0.01;   ///< standard errors; how near the least chi-square is near enough
+  int evaluations = 400;     ///< of the model with its derivatives, of one search
 };
 
 /// From the problem's start values to the whole record by way of windows that grow from a few periods. The effects of the problem are left out.

@@ -90,7 +90,7 @@ FitResult fit(const FitProblem& problem) {
   const auto complete = problem.effects.empty() ? model : std::make_shared<const AeroelasticModel>(model_of(problem.rig, problem.runs, problem.circulation, problem.effects));
   check_names(*complete, problem);
   ArrivalEffort effort;
-  if (!problem.effects.empty()) effort = {false, 10};  // without them the records will not be explained, however long the search
+  if (!problem.effects.empty()) effort = {false, 10, 0.5, 20};  // without them the records will not be explained, however long the search
   Arrival arrival = arrive(problem, model, effort);
   if (!problem.effects.empty()) arrival = go_on_with_effects(problem, arrival, complete);
   FitResult result = describe_fit(arrival, problem);

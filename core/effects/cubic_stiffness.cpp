@@ -25,7 +25,7 @@ Effect cubic_stiffness() {
   e.summary = "stiffness that changes with amplitude";
   e.equation = "F = -k_3 ((h + d)^3 - d^3)";
   e.source = "Duffing, Erzwungene Schwingungen (1918)";
-  e.parameters = {{"coefficient", "N/m^3", 0, -1e12, 1e12, false}, {"static_displacement", "m", 0, -1, 1, true}};
+  e.parameters = {{"coefficient", "N/m^3", 0, -1e30, 1e30, false}, {"static_displacement", "m", 0, -1, 1, true}};
   e.starts = {Eigen::Vector2d(0, 0)};
   e.acts = [](const Conditions&) { return true; };
   e.apply = [](LinearSystem& system, const EffectContext& c) {

@@ -102,9 +102,7 @@ double bic_difference(const Trial& a, const Trial& b) {
 
 Trial fit_baseline(const FitProblem& problem) {
   const auto model = std::make_shared<const AeroelasticModel>(model_of(problem.rig, problem.runs, problem.circulation));
-  ArrivalEffort effort;
-  effort.other_starts = false;
-  effort.iterations = 10;
+  const ArrivalEffort effort{false, 10, 0.5, 15};
   Trial trial{{}, arrive(problem, model, effort)};
   temper(trial.arrival.joint);
   anneal(trial.arrival, 5);
@@ -134,9 +132,7 @@ void fit_exactly(Trial& trial) {
 }
 
 void fit_from_first_guesses(const FitProblem& problem, Trial& trial) {
-  ArrivalEffort effort;
-  effort.other_starts = false;
-  effort.iterations = 10;
+  const ArrivalEffort effort{false, 10, 0.5, 15};
   Trial other{trial.effects, arrive_with_effects(problem, trial.arrival, effort), trial.score};
   temper(other.arrival.joint);
   anneal(other.arrival, 5);
