@@ -1,0 +1,60 @@
+#!/usr/bin/env python3
+"""Verdicts of `unrig diagnose` on a folder of campaigns as a table.
+
+  python3 sample_data/verdicts.py build/unrig sample_data/concealed > VERDICTS.md
+
+Each campaign is a folder with rig.toml, runs (*.csv) and heldout.csv; truth_*.csv are not read. What `diagnose` says is written down as it comes out.
+"""
+import datetime
+import json
+import pathlib
+import subprocess
+import sys
+import tempfile
+
+LIMIT = 120  # seconds a campaign
+
+
+def diagnose(unrig, folder):
+    runs = sorted(p for p in folder.glob("*.csv") if p.name != "heldout.csv" and not p.name.startswith("truth"))
+    with tempfile.TemporaryDirectory() as scratch:
+        output = pathlib.Path(scratch) / "diagnosis.json"
+        command = [unrig, "diagnose", "--rig", folder / "rig.toml", *runs, "--heldout", folder / "heldout.csv", "-o", output]
+        try:
+            subprocess.run([str(c) for c in command], capture_output=True, timeout=LIMIT, check=False)
+        except subprocess.TimeoutExpired:
+            return None
+        return json.loads(output.read_text()) if output.exists() else None
+
+
+def row(name, d):
+    if d is None:
+        return f"| {name} | no verdict within {LIMIT} s | | | | | |"
+    found = ", ".join(f"{m['effect']} ({m['probability']:.3f})" for m in d["missing"]) or ("unexplained" if d["unexplained"] else "nothing missing")
+    if d["missing"] and d["unexplained"]:
+        found += "; something remains"
+    parameters = "; ".join(
+        f"{p['name'].split('.', 1)[1]} {p['value']:.5g}" + (f" ± {p['std_error']:.2g}" if p["std_error"] is not None else "") + f" {p['unit']}"
+        for m in d["missing"] for p in m["parameters"] if "run" not in p)
+    fitted = [r for r in d["improvement"]["runs"] if not r["heldout"]]
+    held = [r for r in d["improvement"]["runs"] if r["heldout"]]
+    rms = lambda rows, key: (sum(r[key] ** 2 for r in rows) / len(rows)) ** 0.5
+    return (f"| {name} | {found} | {parameters} | {rms(fitted, 'rms_before'):.4f} → {rms(fitted, 'rms_after'):.4f} | {rms(fitted, 'noise'):.4f} | "
+            f"{rms(held, 'rms_before'):.4f} → {rms(held, 'rms_after'):.4f} | {d['improvement']['bic_after'] - d['improvement']['bic_before']:.0f} |")
+
+
+def table(named):
+    print("| campaign | verdict (probability among the sets tried) | parameters | fitted, r.m.s. before → after [N] | noise [N] | held out, before → after [N] | ΔBIC |")
+    print("| --- | --- | --- | --- | --- | --- | --- |")
+    for name, d in named:
+        print(row(name, d), flush=True)
+
+
+def main():
+    unrig, campaigns = sys.argv[1], pathlib.Path(sys.argv[2])
+    print(f"{datetime.date.today()}, `python3 sample_data/verdicts.py {unrig} {campaigns}`\n")
+    table((folder.name, diagnose(unrig, folder)) for folder in sorted(campaigns.iterdir()) if (folder / "rig.toml").exists())
+
+
+if __name__ == "__main__":
+    main()
