@@ -50,6 +50,29 @@ Strings candidates(const DiagnoseProblem& problem, const JointProblem& joint, co
   return ids;
 }
 
+bool nonlinear(const Trial& trial) {
+  const JointProblem& joint = trial.arrival.joint;
+  for (std::size_t r = 0; r < joint.runs().size(); ++r)
+    if (joint.runs()[r].largest_arguments(joint.theta(r)).size() > 0) return true;
+  return false;
+}
+
+bool leaves_nothing(const Trial& trial) { return trial.reduced_chi2() < explained; }
+
+/// Fits the trials [first, last): a few rounds for all, the rest for those that are ahead; from first guesses where none of them leaves nothing.
+void fit_those(std::vector<Trial>& trials, std::size_t first, std::size_t last, const DiagnoseProblem& problem, const FitProblem& fit_problem) {
+  const auto begin = trials.begin() + static_cast<std::ptrdiff_t>(first), end = trials.begin() + static_cast<std::ptrdiff_t>(last);
+  in_parallel(last - first, problem.threads, [&](std::size_t i) { fit_fully(trials[first + i], 2); });
+  std::sort(begin, end, [](const Trial& a, const Trial& b) { return a.reduced_chi2() < b.reduced_chi2(); });
+  const std::size_t ahead = std::min(last - first, most_in_full);
+  in_parallel(ahead, problem.threads, [&](std::size_t i) { fit_fully(trials[first + i], 6); });
+  if (std::any_of(begin, end, leaves_nothing)) return;
+  in_parallel(last - first, problem.threads, [&](std::size_t i) {
+    Trial& trial = trials[first + i];
+    if (i < ahead || effect(trial.effects.back()).parameters.empty()) fit_from_first_guesses(fit_problem, trial);
+  });
+}
+
 /// The best of all sets that have one effect more than `base`: all of them by one linear step, the promising ones in full.
 std::vector<Trial> try_one_more(const DiagnoseProblem& problem, const FitProblem& fit_problem, const Trial& base) {
   const Strings ids = candidates(problem, base.arrival.joint, base.effects);
@@ -67,15 +90,14 @@ std::vector<Trial> try_one_more(const DiagnoseProblem& problem, const FitProblem
     const bool promises = promising.size() < most_refits && trial->score > 0.25 * best_score;
     if (prepared.size() <= few || promises_nothing || promises) promising.push_back(std::move(*trial));
   }
-  // A few rounds for all, the rest for those that are ahead.
-  in_parallel(promising.size(), problem.threads, [&](std::size_t i) { fit_fully(promising[i], 2); });
-  std::sort(promising.begin(), promising.end(), [](const Trial& a, const Trial& b) { return a.reduced_chi2() < b.reduced_chi2(); });
-  const std::size_t ahead = std::min(promising.size(), most_in_full);
-  in_parallel(ahead, problem.threads, [&](std::size_t i) { fit_fully(promising[i], 6); });
-  if (std::none_of(promising.begin(), promising.end(), [](const Trial& t) { return t.reduced_chi2() < explained; }))
-    in_parallel(promising.size(), problem.threads, [&](std::size_t i) {
-      if (i < ahead || effect(promising[i].effects.back()).parameters.empty()) fit_from_first_guesses(fit_problem, promising[i]);
-    });
+  // Linear effects first, which are an order faster; nonlinear ones where none of those leaves nothing.
+  const auto first_nonlinear = std::stable_partition(promising.begin(), promising.end(), [](const Trial& t) { return !nonlinear(t); });
+  const auto linear = static_cast<std::size_t>(first_nonlinear - promising.begin());
+  fit_those(promising, 0, linear, problem, fit_problem);
+  if (std::none_of(promising.begin(), first_nonlinear, leaves_nothing))
+    fit_those(promising, linear, promising.size(), problem, fit_problem);
+  else
+    promising.erase(first_nonlinear, promising.end());
   std::sort(promising.begin(), promising.end(), [](const Trial& a, const Trial& b) { return bic_difference(a, b) < 0; });
   return promising;
 }
@@ -93,13 +115,6 @@ Trial without_superfluous(const FitProblem& fit_problem, Trial trial) {
       ++k;
   }
   return trial;
-}
-
-bool nonlinear(const Trial& trial) {
-  const JointProblem& joint = trial.arrival.joint;
-  for (std::size_t r = 0; r < joint.runs().size(); ++r)
-    if (joint.runs()[r].largest_arguments(joint.theta(r)).size() > 0) return true;
-  return false;
 }
 
 double excess(const Trial& trial) { return std::max(0.0, trial.reduced_chi2() - 1); }
@@ -143,9 +158,9 @@ Diagnosis diagnose(const DiagnoseProblem& problem) {
   std::sort(d.ranking.begin(), d.ranking.end(), [](const Candidate& a, const Candidate& b) { return a.delta_bic < b.delta_bic; });
 
   d.remaining = locate_mismatch(best.arrival.joint);
-  const bool leaves_nothing = best.reduced_chi2() < explained || !d.remaining.found;
-  const bool named = !best.effects.empty() && (leaves_nothing || excess(best) < (1 - nearly_all) * excess(baseline));
-  d.unexplained = d.mismatch.found && !leaves_nothing;
+  const bool clean = leaves_nothing(best) || !d.remaining.found;
+  const bool named = !best.effects.empty() && (clean || excess(best) < (1 - nearly_all) * excess(baseline));
+  d.unexplained = d.mismatch.found && !clean;
 
   tell("describing the result");
   FitProblem after = fit_problem;
