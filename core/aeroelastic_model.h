@@ -26,12 +26,12 @@ struct Parameter {
 struct Conditions {
   double density = 0;  ///< kg/m^3
   double speed = 0;    ///< m/s; 0: no circulation
-  double nyquist = 0;  ///< Hz, half the sampling rate; 0: not known
   bool prescribed_pitch = false;  ///< carry angle, rate and acceleration of the shaft as states
   bool force = false;             ///< a measured force at the calibration station
   bool mount = false;             ///< the mount moves: inputs velocity and acceleration
   double onset_angle = 0;  ///< rad, of the shaft before it moves; 0 where the run has no angle
   bool ports = false;      ///< further inputs behind these: a normal force on each strip [N], a generalised force on each coordinate
+  double nyquist = 0;  ///< Hz, half the sampling rate; 0: not known
 };
 
 /// A static nonlinear force f(z) that rides on the linear system: it drives one input column and looks at one combination of the states.
