@@ -10,9 +10,9 @@ constexpr double onset = 8 * 3.14159265358979323846 / 180;  // below it the flow
 
 }  // namespace
 
-/// Slow loss of lift after a change of the angle at high incidence, while the separation point moves forward along the suction side: of the circulatory force
-/// s rho U b l (phi * w) the fraction D is lost with the time constant T_s in semichords, N -= s rho U b l D (w - lag), lag' = (U / b T_s) (w - lag)... so that
-/// phi(s) -> phi(s) - D (1 - exp(-s/T_s)). D and T_s [semichords] are shared by the runs at more than 8 degrees.
+/// Slow loss of lift after a change of the angle at high incidence, while the separation point moves forward along the suction side: of the circulatory force on a strip the
+/// share D of what the downwash w would give in the end is lost with the time constant T_s in semichords, N -= s rho U b l D y, y' = (U / b T_s) (w - y), so that
+/// phi(s) -> phi(s) - D (1 - exp(-s/T_s)). D and T_s are shared by the runs at more than 8 degrees.
 /// Source: J. G. Leishman and T. S. Beddoes, J. American Helicopter Society 34(3) (1989) 3 (first-order lag of the trailing-edge separation point).
 Effect separation_lag() {
   Effect e;
@@ -27,11 +27,10 @@ Effect separation_lag() {
   e.apply = [](LinearSystem& system, const EffectContext& c) {
     const Eigen::Index n = system.states(), first = 2 * system.coordinates, terms = c.model.circulation().rate.size(), parameters = c.theta.size(), inputs = system.B.cols();
     if (system.lags == 0 || terms == 0) return;
-    const Eigen::Index strips = system.lags / terms, slope = c.model.index("normal_force_slope");
+    const Eigen::Index strips = system.lags / terms;
     const Rig& rig = c.model.rig();
     const double b = rig.semichord(), per_time = c.conditions.speed / b, loss = c.parameter(0), time = c.parameter(1);
-    // The downwash from the first lag's rows, y' = rate (w - y); the lost force pushes where the ports of the strips push, a quarter chord ahead of them it twists too:
-    // through the couple of the lags' own columns. Their effect per newton: columns of lag 1 over its amplitude.
+    // The downwash stands in the first lag's rows, y' = rate (w - y); what a strip's circulation does, in its columns, times its amplitude.
     const double rate = c.model.circulation().rate[0] * per_time, amplitude = c.model.circulation_amplitude(c.theta, 0);
     const DualMatrix w_states = (1 / rate) * system.A.block(first, 0, strips, n), w_inputs = (1 / rate) * system.B.block(first, 0, strips, inputs);
     DualMatrix downwash(Eigen::MatrixXd::Zero(strips, n), parameters);
@@ -41,7 +40,6 @@ Effect separation_lag() {
     push.value.middleRows(first, system.lags).setZero();
     for (Eigen::MatrixXd& p : push.partial)
       if (p.size() > 0) p.middleRows(first, system.lags).setZero();
-    (void)slope;
 
     // States lag' = (per_time / T_s) (w - lag); force -D lag.
     const Eigen::Index total = n + strips;

@@ -57,8 +57,7 @@ TEST(Diagnose, FindsTheHigherModes) { expect_verdict("highermode", {}); }
 TEST(Diagnose, FindsTheQuadraticDrag) {
   expect_verdict("drag", {{"quadratic-drag.coefficient", nlohmann::json::parse(read_text(campaigns + "KEY.json"))["drag"]["parameters"]["drag_coefficient"]}});
 }
-/// Takes minutes on a busy machine; run it by hand: --gtest_also_run_disabled_tests --gtest_filter='*DryFriction'.
-TEST(Diagnose, DISABLED_FindsTheDryFriction) { expect_verdict("friction", {}); }
+TEST(Diagnose, FindsTheDryFriction) { expect_verdict("friction", {}); }
 
 /// Roll decay of a ship model: its damping is known to grow with the rate and its righting couple not to be linear (Himeno 1981). The linear model leaves 0.174 deg, one with
 /// both terms 0.0186 deg (measured independently of this project).
