@@ -31,6 +31,8 @@ void check(const CorrectProblem& problem) {
   if (problem.rig.is_modal()) throw InputError({problem.rig.file, 0}, "a rig known only as modes", "wanted a rig with a section and strips", "Describe the section: without it there is no load to separate.");
   if (!run.find("alpha")) throw InputError({run.file, 0}, "no column 'alpha'", "wanted the measured angle of attack", "Record the angle beside the gauge.");
   if (!(run.speed > 0)) throw InputError({run.file, 0}, "speed 0", "wanted a run in a stream", "Circulation needs a stream; free decays are for `unrig fit`.");
+  if (problem.imposed.monotone && problem.imposed.at_step.value_or(0) > 1)
+    throw InputError({run.file, 0}, fmt::format("a response that starts at {:g} and never falls", *problem.imposed.at_step), "wanted a start of at most 1, which is its limit", "");
 }
 
 /// The coupled model with a free build-up of circulation.
@@ -68,6 +70,14 @@ Search estimate(RunResidual& residual, const Prior& prior, const VectorXd& start
   rough = motion_prior(residual, theta);
   residual.set_motion_prior(rough);
   return minimise(residual, prior, theta, well, true);
+}
+
+/// The best theta with that imposed on the response, from the best without it; the weight of the regularisation stays.
+Search constrained(const RunResidual& residual, const Search& best, const Imposed& imposed, const VectorXd& semichords) {
+  constexpr double well = 1e-3;
+  Search search = minimise(residual, impose(best.prior, imposed, residual.model(), semichords), best.solution.theta, well, false);
+  search.determined = best.determined;
+  return search;
 }
 
 /// Samples at which standard deviations are computed: those of a moving shaft, no more than some thousand, and ever fewer while it rests.
@@ -162,6 +172,7 @@ void describe_run(const CorrectProblem& problem, CorrectResult& result) {
   result.force_per_coefficient = run.density * run.speed * run.speed * rig.semichord() * rig.strip_length * static_cast<double>(rig.submerged.size());
   result.gauge = run.channel("gauge").value;
   result.calibration_uncertainty = problem.calibration_uncertainty;
+  result.imposed = problem.imposed;
   result.warnings = run.warnings;
 }
 
@@ -183,21 +194,28 @@ CorrectResult correct(const CorrectProblem& problem) {
   RunResidual residual(model, run, windows);
   const VectorXd start = theta_for(model, problem.fit, run.file);
   MatrixXd rough;
-  const Search best = estimate(residual, prior_of(model, problem.fit, start, run.file), start, rough);
+  const Search free = estimate(residual, prior_of(model, problem.fit, start, run.file), start, rough);
+  const Search best = problem.imposed.any() ? constrained(residual, free, problem.imposed, response_semichords(length)) : free;
   const VectorXd& theta = best.solution.theta;
 
   RunResidual complete = residual;
   complete.differentiate_only({});
-  const RunResidual::Evaluation e = complete.differentiate(best.solution);
-  result.reduced_chi2 = e.chi2 / static_cast<double>(residual.degrees_of_freedom() - static_cast<Index>(best.prior.free.size()));
-  const double inflation = std::sqrt(std::max(1.0, result.reduced_chi2));
-  const UncertaintyBudget budget(residual, e, best.prior, rough, result.calibration_uncertainty, inflation);
+  const auto budget_at = [&](const Search& search) {
+    const RunResidual::Evaluation e = complete.differentiate(search.solution);
+    result.reduced_chi2 = e.chi2 / static_cast<double>(residual.degrees_of_freedom() - static_cast<Index>(search.prior.free.size()));
+    const double inflation = std::sqrt(std::max(1.0, result.reduced_chi2));
+    return UncertaintyBudget(residual, e, search.prior, rough, result.calibration_uncertainty, inflation);
+  };
+  if (problem.imposed.any()) result.indicial = indicial_response(model, free.solution.theta, budget_at(free), length, result.semichords_per_second);
+  const UncertaintyBudget budget = budget_at(best);
 
   const std::vector<Index> at = chosen_samples(residual.motion());
-  const RigidLoad load = load_at(residual, theta, e.linear, at);
+  const RigidLoad load = load_at(residual, theta, best.solution.linear, at);
   result.circulatory = corrected_load(residual, budget, load.circulatory, load.circulatory_by_theta, load.circulatory_by_motion, at);
   result.normal_force = corrected_load(residual, budget, load.normal_force, load.normal_force_by_theta, load.normal_force_by_motion, at);
-  result.indicial = indicial_response(model, theta, budget, length, result.semichords_per_second);
+  IndicialResponse response = indicial_response(model, theta, budget, length, result.semichords_per_second);
+  if (problem.imposed.any()) response.take_tests_of(result.indicial);
+  result.indicial = response;
   vary_weight(residual, best, result);
 
   const RunResidual::Prediction prediction = residual.predict(theta);

@@ -16,6 +16,7 @@ struct CorrectProblem {
   FittedRig fit;
   Run run;
   double calibration_uncertainty = 0;  ///< of the gauge, relative, one standard deviation
+  Imposed imposed = {};                ///< on the indicial response
 };
 
 /// A load over the record [N].
@@ -45,6 +46,7 @@ struct CorrectResult {
   double determined = 0;            ///< number of amplitudes that the data determine
   Eigen::Index amplitudes = 0;      ///< of so many
   bool in_fit = false;              ///< the run took part in the fit
+  Imposed imposed;                  ///< on the response; what its limit at the step is and whether it falls are then of the estimate without that
   double calibration_uncertainty = 0;
   std::vector<std::string> warnings;
 };
@@ -55,6 +57,10 @@ struct CorrectResult {
 /// the prescribed motion and in that of the rig's own motion, both at once in the coupled model. Amplitudes, slope and motion are estimated together from
 /// gauge and angle. Each amplitude has a normal prior around zero whose standard deviation maximises the evidence (correct/prior.h); it decides what the
 /// record leaves open. The answers at half and at twice its weight, 1/tau^2, are part of the result.
+///
+/// What the user wants imposed on the response holds exactly in the answer. The standard deviations under an imposed phi(0) take it for exact; under imposed monotonicity they are
+/// those without it: the constrained estimate is the point nearest to the free one in the metric of its information within a convex set that holds the
+/// truth, and no further from it there, so that they are upper estimates.
 ///
 /// Standard deviations by source: correct/uncertainty_budget.h. They are computed at up to some thousand samples, all of those in which the shaft moves as long as
 /// these are few, and interpolated between. The gauge's zero and the steady load cannot be told apart: the steady part of the load is the reading

@@ -21,13 +21,16 @@ int correct_command(int argc, char** argv) {
   app.add_option("--indicial", indicial, "indicial response (CSV)");
   app.add_option("--calibration-error", calibration, "relative standard deviation of the gauge's calibration")
       ->check(CLI::Range(0.0, 1.0));
+  Imposed imposed;
+  app.add_flag("--monotone", imposed.monotone, "impose an indicial response that never falls (else only tested)");
+  app.add_option("--at-step", imposed.at_step, "impose its value at the step, 0.5 for a thin airfoil (else only tested)")->check(CLI::Range(-1.0, 2.0));
   app.footer("Example:\n  unrig correct --rig rig.toml --fit fit.json step_a.csv -o step_a_corrected.csv --indicial step_a_indicial.csv");
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& e) {
     return app.exit(e) == 0 ? exit_done : exit_wrong_use;
   }
-  const CorrectResult result = correct({read_rig(rig_path), read_fit(fit_path), read_run(run_path), calibration});
+  const CorrectResult result = correct({read_rig(rig_path), read_fit(fit_path), read_run(run_path), calibration, imposed});
   for (const std::string& warning : result.warnings) warn(warning);
   write_text(output, to_csv(result));
   if (!indicial.empty()) write_text(indicial, to_indicial_csv(result));

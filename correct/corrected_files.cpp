@@ -71,13 +71,14 @@ std::string indicial_report(const CorrectResult& r) {
     return fmt::format("{:.4f} +/- {:.2g} at {:.3g}", response.value[i], response.uncertainty.std[i], response.semichords[i]);
   };
   std::string text = fmt::format("    indicial response    {}, {}, {}, {} semichords\n", at(0.5), at(2), at(8), at(30));
-  text += fmt::format("        at the step      {:.3f} +/- {:.2g} ({:+.1f} standard deviations from 1/2); 1 at infinity, which is the slope\n", response.at_step,
-                      response.at_step_std, (response.at_step - 0.5) / response.at_step_std);
-  if (std::isinf(response.steepest_fall))
-    text += "        monotone         it nowhere falls\n";
-  else
-    text += fmt::format("        monotone         it falls at {:.3g} semichords; one that never falls looks so with a probability of {:.2g}\n", response.steepest_fall,
-                        response.monotone_p);
+  text += fmt::format("        at the step      {}{:.3f} +/- {:.2g} ({:+.1f} standard deviations from 1/2); 1 at infinity, which is the slope\n",
+                      r.imposed.at_step ? fmt::format("{:g} imposed; without that ", *r.imposed.at_step) : "", response.at_step, response.at_step_std,
+                      (response.at_step - 0.5) / response.at_step_std);
+  text += fmt::format("        monotone         {}", r.imposed.monotone ? "imposed; without that " : "");
+  text += std::isinf(response.steepest_fall) ? "it nowhere falls\n"
+                                             : fmt::format("it falls at {:.3g} semichords; one that never falls looks so with a probability of {:.2g}\n", response.steepest_fall,
+                                                           response.monotone_p);
+  if (r.imposed.monotone) text += "                         (standard deviations are those without it: upper estimates)\n";
   text += std::isfinite(response.trusted_from) ? fmt::format("    known to 5 % from    {:.3g} semichords on\n", response.trusted_from)
                                                : "    known to 5 %         nowhere in this record\n";
   text += response.highest > 0 ? fmt::format("    usable bandwidth     {:.3g} to {:.3g} Hz (response to oscillation known to 5 %)\n", response.lowest, response.highest)

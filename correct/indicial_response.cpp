@@ -71,17 +71,28 @@ void find_bandwidth(const AeroelasticModel& model, const VectorXd& theta, const 
 
 }  // namespace
 
+void IndicialResponse::take_tests_of(const IndicialResponse& other) {
+  at_step = other.at_step;
+  at_step_std = other.at_step_std;
+  steepest_fall = other.steepest_fall;
+  monotone_p = other.monotone_p;
+}
+
+VectorXd response_semichords(double longest) {
+  constexpr Index per_decade = 40;
+  constexpr double shortest = 0.01;
+  return spread_evenly(shortest, std::max(longest, 2 * shortest), per_decade);
+}
+
 VectorXd indicial_values(const AeroelasticModel& model, const VectorXd& theta, const VectorXd& semichords) {
   return (response_rows(model, theta.size(), semichords) * theta).array() + 1;
 }
 
 IndicialResponse indicial_response(const AeroelasticModel& model, const VectorXd& theta, const UncertaintyBudget& budget, double longest,
                                    double semichords_per_second) {
-  constexpr Index per_decade = 40;
-  constexpr double shortest = 0.01;
   const Index parameters = theta.size(), unknowns = budget.root().rows() - parameters;
   IndicialResponse r;
-  r.semichords = spread_evenly(shortest, std::max(longest, 2 * shortest), per_decade);
+  r.semichords = response_semichords(longest);
   r.value = indicial_values(model, theta, r.semichords);
   MatrixXd rows = response_rows(model, parameters, r.semichords);
   const MatrixXd nothing = MatrixXd::Zero(r.value.size(), unknowns);

@@ -17,9 +17,15 @@ struct IndicialResponse {
   double monotone_p = 1;     ///< probability that a response that never falls looks as falling as this one does somewhere
   double trusted_from = 0;   ///< semichords from which on the standard deviation is below 5 % of the value; infinity: nowhere
   double lowest = 0, highest = 0;  ///< Hz: where the standard deviation of the response to oscillation is below 5 %; both 0: nowhere
+
+  /// The start of the response, and whether it falls, as this other estimate has them.
+  void take_tests_of(const IndicialResponse& other);
 };
 
-/// 40 values per decade from 0.01 semichords to `longest`, at theta.
+/// Where the response is given: 40 values per decade from 0.01 semichords to `longest`.
+Eigen::VectorXd response_semichords(double longest);
+
+/// At `response_semichords`, at theta.
 ///
 /// Response to oscillation: C(i w) = 1 - sum_k A_k i w / (i w + beta_k U/b), Theodorsen's function where phi is Wagner's; looked at up to the fastest
 /// rate of the model, which is no finer. It falls (p value) by the tube formula of `simultaneous_factor`, one-sided.

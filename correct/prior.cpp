@@ -7,6 +7,8 @@
 #include <filesystem>
 #include <utility>
 
+#include "correct/constrained_step.h"
+
 namespace unrig {
 namespace {
 
@@ -47,7 +49,7 @@ MatrixXd root_of(const MatrixXd& covariance) {
   return deviation.asDiagonal() * MatrixXd(correlation.llt().matrixL());
 }
 
-double cost(double chi2, const Prior& prior, const VectorXd& theta) { return chi2 + (prior.rows() * (theta - prior.mean)).squaredNorm(); }
+double cost(double chi2, const Prior& prior, const VectorXd& theta) { return chi2 + prior.off(theta).squaredNorm(); }
 
 /// Data and prior, linearised: residuals | J d theta, over all parameters.
 std::pair<VectorXd, MatrixXd> linear_model(const RunResidual::Evaluation& e, const Prior& prior, const VectorXd& theta) {
@@ -55,49 +57,84 @@ std::pair<VectorXd, MatrixXd> linear_model(const RunResidual::Evaluation& e, con
   MatrixXd rows(e.jacobian.rows() + known.rows(), theta.size());
   rows << e.jacobian, known;
   VectorXd residual(rows.rows());
-  residual << e.residual, known * (theta - prior.mean);
+  residual << e.residual, prior.off(theta);
   return {residual, rows};
 }
 
 }  // namespace
 
 MatrixXd Prior::regularisation() const {
-  MatrixXd rows = MatrixXd::Zero(static_cast<Index>(amplitudes.size()), mean.size());
+  MatrixXd rows = MatrixXd::Zero(static_cast<Index>(amplitudes.size()), known.cols());
   for (std::size_t k = 0; k < amplitudes.size(); ++k) rows(static_cast<Index>(k), amplitudes[k]) = 1 / amplitude;
   return rows;
 }
 
 MatrixXd Prior::rows() const {
-  MatrixXd all(rig.rows() + static_cast<Index>(amplitudes.size()), mean.size());
-  all << rig, regularisation();
+  MatrixXd all(known.rows() + static_cast<Index>(amplitudes.size()), known.cols());
+  all << known, regularisation();
   return all;
+}
+
+VectorXd Prior::off(const VectorXd& theta) const {
+  VectorXd all(known.rows() + static_cast<Index>(amplitudes.size()));
+  all << known * theta - known_value, regularisation() * theta;
+  return all;
+}
+
+bool Prior::allows(const VectorXd& theta) const {
+  constexpr double rounding = 1e-9;  // of the response
+  return rising.rows() == 0 || (rising * theta).minCoeff() > -rounding;
+}
+
+Prior impose(Prior prior, const Imposed& imposed, const AeroelasticModel& model, const VectorXd& semichords) {
+  constexpr double exactly = 1e-6;
+  const Index parameters = prior.known.cols(), rows = prior.known.rows();
+  if (imposed.at_step) {
+    prior.known.conservativeResize(rows + 1, parameters);
+    prior.known.row(rows).setZero();
+    for (const Index j : prior.amplitudes) prior.known(rows, j) = 1 / exactly;
+    prior.known_value.conservativeResize(rows + 1);
+    prior.known_value[rows] = (1 - *imposed.at_step) / exactly;
+  }
+  if (!imposed.monotone) return prior;
+  // phi(s_i) - phi(s_(i-1)) = sum_k A_k (exp(-beta_k s_(i-1)) - exp(-beta_k s_i)); s_-1 = 0. Behind the last, ten times as far.
+  VectorXd s(semichords.size() + 12);
+  s << 0, semichords, (VectorXd::LinSpaced(11, 0, 1) * std::log(10.0)).array().exp() * semichords[semichords.size() - 1] * 1.01;
+  prior.rising = MatrixXd::Zero(s.size() - 1, parameters);
+  for (std::size_t k = 0; k < prior.amplitudes.size(); ++k) {
+    const VectorXd decay = (-model.circulation().rate[static_cast<Index>(k)] * s.array()).exp();
+    prior.rising.col(prior.amplitudes[k]) = decay.head(s.size() - 1) - decay.tail(s.size() - 1);
+  }
+  return prior;
 }
 
 Prior prior_of(const AeroelasticModel& model, const FittedRig& fit, const VectorXd& theta, const std::string& run_file) {
   Prior prior;
-  prior.mean = theta;
   std::vector<Index> rig;
   for (Index j = 0; j < theta.size(); ++j) (model.parameters()[static_cast<std::size_t>(j)].per_run ? prior.free : rig).push_back(j);
-  for (Index k = 0; k < model.circulation().rate.size(); ++k) {
-    prior.amplitudes.push_back(model.circulation_parameter(k));
-    prior.mean[prior.amplitudes.back()] = 0;
-  }
+  for (Index k = 0; k < model.circulation().rate.size(); ++k) prior.amplitudes.push_back(model.circulation_parameter(k));
   const MatrixXd root = root_of(rig_covariance(model, fit, theta, rig, run_file));
   if (took_part(fit, run_file)) {
     prior.held = rig;
     prior.held_root = root;
-    prior.rig.resize(0, theta.size());
+    prior.known.resize(0, theta.size());
   } else {
     prior.free.insert(prior.free.end(), rig.begin(), rig.end());
-    prior.rig = MatrixXd::Zero(root.rows(), theta.size());
+    prior.known = MatrixXd::Zero(root.rows(), theta.size());
     const MatrixXd inverse = root.triangularView<Eigen::Lower>().solve(MatrixXd::Identity(root.rows(), root.cols()));
-    prior.rig(Eigen::all, rig) = inverse;
+    prior.known(Eigen::all, rig) = inverse;
   }
+  prior.known_value = prior.known * theta;
   return prior;
 }
 
 VectorXd gauss_newton_step(const RunResidual::Evaluation& e, const Prior& prior, const VectorXd& theta) {
   const auto [residual, rows] = linear_model(e, prior, theta);
+  if (prior.rising.rows() > 0) {
+    VectorXd step = VectorXd::Zero(theta.size());
+    step(prior.free) = least_squares_above(rows(Eigen::all, prior.free), -residual, prior.rising(Eigen::all, prior.free), -prior.rising * theta);
+    return step;
+  }
   MatrixXd scaled = rows(Eigen::all, prior.free);
   const VectorXd scale = scaled.colwise().norm().transpose().cwiseMax(1e-300).cwiseInverse();
   scaled = scaled * scale.asDiagonal();
@@ -124,12 +161,13 @@ Search minimise(const RunResidual& residual, Prior prior, const VectorXd& theta,
     const VectorXd move = gauss_newton_step(search.evaluation, search.prior, at);
     const auto [left, rows] = linear_model(search.evaluation, search.prior, at);
     const double promised = left.squaredNorm() - (left + rows * move).squaredNorm();
-    if ((promised < enough && change < settled) || step == most_steps - 1) break;
+    const bool allowed = search.prior.allows(at);
+    if ((allowed && promised < enough && change < settled) || step == most_steps - 1) break;
     bool moved = false;
     double fraction = 1;
     for (int halving = 0; halving < most_halvings && !moved; ++halving, fraction /= 2) {
       RunResidual::Solution next = residual.solve(at + fraction * move);
-      moved = cost(next.chi2, search.prior, next.theta) < now;
+      moved = !allowed || cost(next.chi2, search.prior, next.theta) < now;
       if (moved) search.solution = std::move(next);
     }
     if (!moved) break;
@@ -142,12 +180,12 @@ Evidence evidence(const RunResidual::Evaluation& e, const Prior& prior, const Ve
   const auto count = static_cast<Index>(prior.free.size());
   std::vector<Index> place;  // of the amplitudes among the free parameters
   for (const Index j : prior.amplitudes) place.push_back(std::find(prior.free.begin(), prior.free.end(), j) - prior.free.begin());
-  MatrixXd rows(e.jacobian.rows() + prior.rig.rows(), theta.size());
-  rows << e.jacobian, prior.rig;
+  MatrixXd rows(e.jacobian.rows() + prior.known.rows(), theta.size());
+  rows << e.jacobian, prior.known;
   const MatrixXd known = rows(Eigen::all, prior.free);
   const VectorXd at = theta(prior.free);
   VectorXd right(rows.rows());
-  right << -e.residual + e.jacobian(Eigen::all, prior.free) * at, -(prior.rig * (theta - prior.mean)) + prior.rig(Eigen::all, prior.free) * at;
+  right << -e.residual + e.jacobian(Eigen::all, prior.free) * at, prior.known_value - prior.known * theta + prior.known(Eigen::all, prior.free) * at;
   const VectorXd scale = known.colwise().norm().transpose().cwiseMax(1e-12).cwiseInverse();
 
   Evidence result{prior.amplitude, 0};

@@ -1,5 +1,6 @@
 #pragma once
 #include <Eigen/Core>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -16,15 +17,20 @@ namespace unrig {
 /// A rig parameter that the fit could not determine is uncertain by its whole value. The run's own parameters (slope and others) are free without prior.
 ///
 /// Amplitudes of the circulation: each normal around zero with standard deviation `amplitude`, chosen by evidence.
+///
+/// What the user imposes: a value of phi(0) is one more known row, with a standard deviation of a millionth; `rising` are rows over theta that may not become negative.
 struct Prior {
-  Eigen::VectorXd mean;
   std::vector<Eigen::Index> free, held, amplitudes;  ///< indices into theta
-  Eigen::MatrixXd rig;        ///< rows over theta: sqrt(precision) of the free rig parameters
+  Eigen::MatrixXd known;        ///< rows over theta: sqrt(precision) of the free rig parameters, and of what is imposed
+  Eigen::VectorXd known_value;  ///< known theta = known_value, within one
+  Eigen::MatrixXd rising;       ///< rising theta >= 0
   Eigen::MatrixXd held_root;  ///< square root of the covariance of the held ones
   double amplitude = 0.5;
 
   Eigen::MatrixXd regularisation() const;  ///< rows over theta: sqrt(precision) of the amplitudes
   Eigen::MatrixXd rows() const;            ///< both
+  Eigen::VectorXd off(const Eigen::VectorXd& theta) const;  ///< by how much theta is off them
+  bool allows(const Eigen::VectorXd& theta) const;          ///< it rises, up to rounding
 };
 
 Prior prior_of(const AeroelasticModel& model, const FittedRig& fit, const Eigen::VectorXd& theta, const std::string& run_file);
@@ -38,7 +44,17 @@ struct Evidence {
 };
 Evidence evidence(const RunResidual::Evaluation& e, const Prior& prior, const Eigen::VectorXd& theta);
 
-/// The step to the least of chi-square and prior of the model linearised at `e`, over the free parameters; zero for the others.
+/// The same with phi(0) imposed where it is given, and with a phi that never falls from one of `semichords` to the next, from 0 to the first, nor behind the last.
+struct Imposed {
+  bool monotone = false;
+  std::optional<double> at_step;  ///< phi(0)
+
+  bool any() const { return monotone || at_step.has_value(); }
+};
+Prior impose(Prior prior, const Imposed& imposed, const AeroelasticModel& model, const Eigen::VectorXd& semichords);
+
+/// The step to the least of chi-square and prior of the model linearised at `e`, over the free parameters; zero for the others. It ends where the prior allows.
+/// Throws std::invalid_argument where it allows nothing.
 Eigen::VectorXd gauss_newton_step(const RunResidual::Evaluation& e, const Prior& prior, const Eigen::VectorXd& theta);
 
 /// A search for the best theta, and the prior that it was found with.
@@ -50,7 +66,7 @@ struct Search {
 };
 
 /// Gauss-Newton with halved steps over the free parameters until the linear model promises less than `enough` of chi-square. `learn`: the weight of the
-/// regularisation follows the evidence at every step.
+/// regularisation follows the evidence at every step. From a theta that the prior does not allow the first step is taken whole.
 Search minimise(const RunResidual& residual, Prior prior, const Eigen::VectorXd& theta, double enough, bool learn);
 
 }  // namespace unrig

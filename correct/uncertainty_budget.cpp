@@ -85,7 +85,7 @@ UncertaintyBudget::UncertaintyBudget(const RunResidual& residual, const RunResid
   const auto share = [](const MatrixXd& a) -> MatrixXd { return a.transpose() * a; };
   MatrixXd smoothing = share(prior.regularisation() * F.topRows(parameters));
   if (motion_prior.rows() > 0) smoothing += share(motion_prior * c_rows);
-  const MatrixXd rig = share(prior.rig * F.topRows(parameters));
+  const MatrixXd rig = share(prior.known * F.topRows(parameters));
   const MatrixXd gauge = MatrixXd::Identity(F.cols(), F.cols()) - angle - smoothing - rig;
 
   const auto root_of_share = [&](const MatrixXd& a) -> MatrixXd {

@@ -81,6 +81,7 @@ TEST(WrongUse, EndsWithStatusTwoAndSaysWhy) {
       {{"fit", "--rig", "rig.toml", "--wanger", "jones", "run.csv", "-o", "fit.json"}, "--wanger"},
       {{"correct", "--rig", "rig.toml", "run.csv", "-o", "out.csv"}, "--fit is required"},
       {{"correct", "--rig", "rig.toml", "--fit", "fit.json", "a.csv", "b.csv", "-o", "out.csv"}, "b.csv"},
+      {{"correct", "--rig", "rig.toml", "--fit", "fit.json", "a.csv", "-o", "out.csv", "--at-step", "half"}, "half"},
       {{"apparent-mass", "--rig", "rig.toml", "--dry", "dry.csv", "-o", "out.json"}, "--wet is required"},
       {{"simulate", "--rig", "rig.toml", "-o", "out.csv"}, "--run is required"},
   };
