@@ -206,7 +206,8 @@ SimulateResult simulate(const SimulateProblem& problem) {
   const std::vector<Output> outputs = outputs_of(problem.model.rig(), run);
   SimulateResult result;
   for (const Output& output : outputs) result.simulated.push_back(output.name);
-  const LinearSystem system = problem.model.system(conditions, problem.theta, result.simulated);
+  LinearSystem system = problem.model.system(conditions, problem.theta, result.simulated);
+  for (DualMatrix* m : {&system.A, &system.B, &system.C, &system.D}) m->partial.clear();  // nobody asks for derivatives
 
   result.run = run;
   MatrixXd reading = response_of(problem, system, conditions);

@@ -313,7 +313,10 @@ Arrival go_on_with_effects(const FitProblem& problem, const Arrival& without, co
 
 void refine(Arrival& arrival, const FitProblem& problem) {
   JointProblem& joint = arrival.joint;
-  for (std::size_t r = 0; r < joint.runs().size(); ++r) joint.runs()[r].settle_noise(joint.theta(r));
+  for (std::size_t r = 0; r < joint.runs().size(); ++r) {
+    joint.runs()[r].settle_noise(joint.theta(r));
+    joint.runs()[r].search_exactly(true);
+  }
   constexpr int rounds = 4;
   for (int round = 0; round < rounds; ++round) {
     Index rejected = 0;

@@ -3,6 +3,9 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numeric>
+
+#include "core/in_parallel.h"
 
 namespace unrig {
 namespace {
@@ -89,7 +92,11 @@ JointProblem::Summary JointProblem::solve(const SolveOptions& options) {
   std::vector<Index> free;
   for (const Unknown& u : unknowns_)
     if (!u.held) free.push_back(u.parameter);
-  for (RunResidual& run : runs_) run.differentiate_only(free);
+  constexpr double finest = 3e-3;
+  for (RunResidual& run : runs_) {
+    run.differentiate_only(free);
+    run.search_linear_to(options.prior ? 0.1 : std::max(finest, 0.1 * options.precision));
+  }
   LeastSquaresOptions search;
   search.iterations = options.iterations;
   search.relative_change = options.tolerance;
@@ -99,7 +106,10 @@ JointProblem::Summary JointProblem::solve(const SolveOptions& options) {
   search.effort = options.restarts ? LeastSquaresOptions::Effort::until_arrived : LeastSquaresOptions::Effort::once;
   search.evaluations = options.most_evaluations;
   const LeastSquaresResult result = solve_least_squares(problem, search);
-  for (RunResidual& run : runs_) run.differentiate_only({});
+  for (RunResidual& run : runs_) {
+    run.differentiate_only({});
+    run.search_linear_to(finest);
+  }
   for (std::size_t i = 0; i < unknowns_.size(); ++i) unknowns_[i].value = result.point.values[static_cast<Index>(i)];
   return {result.arrived, result.point.finite ? result.chi2() : std::numeric_limits<double>::infinity(), result.evaluations, result.message};
 }
@@ -115,7 +125,8 @@ JointProblem::Linearisation JointProblem::linearise() const {
   Linearisation lin;
   lin.residual.resize(rows * static_cast<Index>(runs_.size()));
   lin.jacobian = MatrixXd::Zero(lin.residual.size(), count);
-  for (std::size_t r = 0; r < runs_.size(); ++r) {
+  lin.run_chi2.resize(runs_.size());
+  in_parallel(runs_.size(), [&](std::size_t r) {
     const RunResidual::Evaluation e = runs_[r].evaluate(theta(r), Partials::all);
     const Index first = rows * static_cast<Index>(r);
     lin.residual.segment(first, rows) = e.residual;
@@ -123,15 +134,15 @@ JointProblem::Linearisation JointProblem::linearise() const {
       const Unknown& u = unknowns_[static_cast<std::size_t>(i)];
       if (u.run < 0 || u.run == static_cast<int>(r)) lin.jacobian.col(i).segment(first, rows) = e.jacobian.col(u.parameter);
     }
-    lin.run_chi2.push_back(e.chi2);
-  }
+    lin.run_chi2[r] = e.chi2;
+  });
   return lin;
 }
 
 double JointProblem::chi2() const {
-  double sum = 0;
-  for (std::size_t r = 0; r < runs_.size(); ++r) sum += runs_[r].evaluate(theta(r), Partials::none).chi2;
-  return sum;
+  std::vector<double> of_run(runs_.size());
+  in_parallel(runs_.size(), [&](std::size_t r) { of_run[r] = runs_[r].evaluate(theta(r), Partials::none).chi2; });
+  return std::accumulate(of_run.begin(), of_run.end(), 0.0);
 }
 
 }  // namespace unrig

@@ -3,10 +3,12 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <atomic>
 #include <cmath>
 #include <stdexcept>
 #include <utility>
 
+#include "core/in_parallel.h"
 #include "fit/gauss_newton.h"
 #include "fit/trust_region.h"
 
@@ -120,19 +122,23 @@ std::string obstacle(const LeastSquaresProblem& problem, const LeastSquaresPoint
 LeastSquaresPoint evaluate(const LeastSquaresProblem& problem, const VectorXd& values, bool derivatives) {
   LeastSquaresPoint point{values, VectorXd::Zero(problem.residuals()), {}, true};
   if (derivatives) point.jacobian.setZero(problem.residuals(), values.size());
-  Index first = 0;
-  for (const ResidualTerm& term : problem.terms) {
+  std::vector<Index> first{0};
+  for (const ResidualTerm& term : problem.terms) first.push_back(first.back() + term.size);
+  std::atomic<bool> finite{true};
+  in_parallel(problem.terms.size(), [&](std::size_t t) {
+    const ResidualTerm& term = problem.terms[t];
     const auto count = static_cast<Index>(term.unknowns.size());
     const std::vector<Index> columns(term.unknowns.begin(), term.unknowns.end());
     VectorXd residual = VectorXd::Zero(term.size);
     MatrixXd jacobian = MatrixXd::Zero(term.size, derivatives ? count : 0);
-    point.finite = term.evaluate(values(columns), residual, derivatives ? &jacobian : nullptr) && residual.allFinite() && jacobian.allFinite();
-    if (!point.finite) return point;
-    point.residual.segment(first, term.size) = residual;
-    for (Index a = 0; a < jacobian.cols(); ++a) point.jacobian.col(columns[static_cast<std::size_t>(a)]).segment(first, term.size) += jacobian.col(a);
-    first += term.size;
-  }
-  point.finite = std::isfinite(point.chi2());
+    if (!finite || !term.evaluate(values(columns), residual, derivatives ? &jacobian : nullptr) || !residual.allFinite() || !jacobian.allFinite()) {
+      finite = false;
+      return;
+    }
+    point.residual.segment(first[t], term.size) = residual;
+    for (Index a = 0; a < jacobian.cols(); ++a) point.jacobian.col(columns[static_cast<std::size_t>(a)]).segment(first[t], term.size) += jacobian.col(a);
+  });
+  point.finite = finite && std::isfinite(point.chi2());
   return point;
 }
 

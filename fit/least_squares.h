@@ -18,7 +18,7 @@ struct LeastSquaresUnknown {
   double scale = 0;  ///< a change of it that matters, in its own unit; 0: its start value, or what moves the residual by its own length
 };
 
-/// Some residuals, each divided by its standard deviation, and the unknowns they depend on.
+/// Some residuals, each divided by its standard deviation, and the unknowns they depend on. Several terms are evaluated at the same time, in as many threads.
 struct ResidualTerm {
   std::vector<std::size_t> unknowns;  ///< indices into LeastSquaresProblem::unknowns
   Eigen::Index size = 0;              ///< number of residuals

@@ -139,20 +139,29 @@ std::shared_ptr<RunResidual::Linearised> RunResidual::equivalent_linear(const Li
   return plain;
 }
 
-namespace {
+bool RunResidual::worth_going_on(double promised, double chi2) const {
+  constexpr double rounding = 1e-9;
+  return promised > linear_precision_ * linear_precision_ + rounding * chi2;
+}
 
-constexpr double negligible = 1e-5;  // of the unit that chi-square rises by at one standard deviation
+/// c that the last slopes lead to from where they were taken, else that of the last solution or, where there is none, of the linear part alone.
+RunResidual::NonlinearPoint RunResidual::first_nonlinear_point(const Linearised& lin, const VectorXd& theta) const {
+  NonlinearPoint best;
+  const auto consider = [&](const VectorXd& linear) {
+    if (NonlinearPoint point = nonlinear_point(lin, theta, linear); point.chi2 < best.chi2 || !std::isfinite(best.chi2)) best = std::move(point);
+  };
+  if (guide_.theta.size() == theta.size()) {
+    const VectorXd predicted = guide_.linear + guide_.slope * (theta - guide_.theta);
+    if (predicted.allFinite()) consider(predicted);
+    if (std::isfinite(best.chi2) && best.chi2 < 2 * guide_.chi2) return best;
+  }
+  if (last_linear_.size() > 0) consider(last_linear_);
+  if (!std::isfinite(best.chi2)) consider(equivalent_linear(lin, VectorXd::Zero(static_cast<Index>(lin.system.feedback.size())))->linear);
+  return best;
+}
 
-bool worth_going_on(double promised, double chi2) { return promised > negligible + 1e-9 * chi2; }
-
-}  // namespace
-
-/// c from the last solution or, where there is none, from that of the linear part alone.
 void RunResidual::solve_nonlinear(Linearised& lin, const VectorXd& theta) const {
-  const auto feedbacks = static_cast<Index>(lin.system.feedback.size());
-  NonlinearPoint point;
-  if (last_linear_.size() > 0) point = nonlinear_point(lin, theta, last_linear_);
-  if (!std::isfinite(point.chi2)) point = nonlinear_point(lin, theta, equivalent_linear(lin, VectorXd::Zero(feedbacks))->linear);
+  NonlinearPoint point = first_nonlinear_point(lin, theta);
   lin.chi2 = INFINITY;
   if (!std::isfinite(point.chi2)) return;
   if (motion_.unknowns() > 0)

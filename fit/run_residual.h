@@ -139,6 +139,10 @@ class RunResidual {
   /// where the rig moves so little that the law is far from any line (friction that sticks).
   void search_exactly(bool exact) { exact_tangents_ = exact; }
 
+  /// How near c of a nonlinear run is searched to its least chi-square, in standard errors. The slopes of chi-square in theta do not feel what is left: they are
+  /// taken across the directions of c.
+  void search_linear_to(double precision) { linear_precision_ = precision; }
+
   Eigen::VectorXd channel_weight(std::size_t channel) const { return weight_.col(static_cast<Eigen::Index>(channel)); }
   const Eigen::VectorXd& angle_weight() const { return angle_weight_; }
 
@@ -152,6 +156,8 @@ class RunResidual {
   Eigen::VectorXd whole_jerk(const Eigen::VectorXd& linear) const;
   bool stack_nonlinear_rows(Linearised& lin, const Eigen::VectorXd& theta, const Eigen::VectorXd& linear) const;
   struct NonlinearPoint;
+  NonlinearPoint first_nonlinear_point(const Linearised& lin, const Eigen::VectorXd& theta) const;
+  bool worth_going_on(double promised, double chi2) const;
   NonlinearPoint nonlinear_point(const Linearised& lin, const Eigen::VectorXd& theta, const Eigen::VectorXd& linear) const;
   std::shared_ptr<Linearised> equivalent_linear(const Linearised& lin, const Eigen::VectorXd& slope) const;
   void solve_nonlinear(Linearised& lin, const Eigen::VectorXd& theta) const;
@@ -191,7 +197,15 @@ class RunResidual {
   Eigen::Index spikes_ = 0;
   Eigen::Index last_sample_ = 0;
 
-  mutable Eigen::VectorXd last_linear_;  ///< c of the last nonlinear solution, from which the next one starts
+  /// From where the search for c starts in a nonlinear run: c of the last solution, and that of the last one whose derivatives are known.
+  mutable Eigen::VectorXd last_linear_;
+  struct Guide {
+    Eigen::VectorXd theta, linear;
+    Eigen::MatrixXd slope;  ///< d c / d theta
+    double chi2 = 0;
+  };
+  mutable Guide guide_;
+  double linear_precision_ = 3e-3;
 
   // Layout of c.
   std::vector<Eigen::Index> free_;  ///< states whose initial value is unknown

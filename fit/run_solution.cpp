@@ -236,6 +236,7 @@ RunResidual::Evaluation RunResidual::differentiate(const Solution& solution) con
   e.jacobian.topRows(triangle.rows()) = triangle.leftCols(parameters);
   e.residual.head(triangle.rows()) = triangle.col(parameters);
   e.chi2 = e.residual.squaredNorm();
+  if (!solution.model->system.feedback.empty()) guide_ = {solution.theta, e.linear, e.linear_slope, solution.chi2};
   return e;
 }
 

@@ -1,12 +1,12 @@
 #include "fit/diagnose/diagnose.h"
 
 #include <algorithm>
-#include <atomic>
 #include <chrono>
 #include <cmath>
-#include <thread>
+#include <iterator>
 
 #include "core/effects/effect.h"
+#include "core/in_parallel.h"
 #include "fit/diagnose/heldout.h"
 #include "fit/diagnose/search.h"
 #include "fit/fit_description.h"
@@ -23,19 +23,6 @@ constexpr double nearly_explained = 10;
 constexpr double decisive = 10;        // BIC: very strong evidence (Kass and Raftery 1995)
 constexpr std::size_t most_refits = 5, most_effects = 3, most_in_full = 2;
 constexpr std::size_t few = 7;  // candidates that are all worth a fit
-
-/// Runs `work(0..count)` on so many threads.
-template <class Work>
-void in_parallel(std::size_t count, int threads, Work work) {
-  std::atomic<std::size_t> next{0};
-  const auto worker = [&] {
-    for (std::size_t i = next++; i < count; i = next++) work(i);
-  };
-  std::vector<std::thread> others;
-  for (int t = 1; t < threads; ++t) others.emplace_back(worker);
-  worker();
-  for (std::thread& t : others) t.join();
-}
 
 /// Effects that can act in at least one of the runs of this rig and are not at work yet.
 Strings candidates(const DiagnoseProblem& problem, const JointProblem& joint, const Strings& at_work) {
@@ -59,47 +46,63 @@ bool nonlinear(const Trial& trial) {
 
 bool leaves_nothing(const Trial& trial) { return trial.reduced_chi2() < explained; }
 
-/// Fits the trials [first, last): a few rounds for all, the rest for those that are ahead; from first guesses where none of them leaves nothing.
-void fit_those(std::vector<Trial>& trials, std::size_t first, std::size_t last, const DiagnoseProblem& problem, const FitProblem& fit_problem) {
-  const auto begin = trials.begin() + static_cast<std::ptrdiff_t>(first), end = trials.begin() + static_cast<std::ptrdiff_t>(last);
-  in_parallel(last - first, problem.threads, [&](std::size_t i) { fit_fully(trials[first + i], 2); });
-  std::sort(begin, end, [](const Trial& a, const Trial& b) { return a.reduced_chi2() < b.reduced_chi2(); });
-  const std::size_t ahead = std::min(last - first, most_in_full);
-  in_parallel(ahead, problem.threads, [&](std::size_t i) { fit_fully(trials[first + i], 6); });
-  if (std::any_of(begin, end, leaves_nothing)) return;
-  in_parallel(last - first, problem.threads, [&](std::size_t i) {
-    Trial& trial = trials[first + i];
-    if (i < ahead || effect(trial.effects.back()).parameters.empty()) fit_from_first_guesses(fit_problem, trial);
+/// Some trials, the best first once they are fitted.
+using Trials = std::vector<Trial>;
+
+/// A few rounds for all, the rest for those that are ahead.
+void fit_ahead(Trials& trials) {
+  in_parallel(trials.size(), [&](std::size_t i) { fit_fully(trials[i], 2); });
+  std::sort(trials.begin(), trials.end(), [](const Trial& a, const Trial& b) { return a.reduced_chi2() < b.reduced_chi2(); });
+  in_parallel(std::min(trials.size(), most_in_full), [&](std::size_t i) {
+    const bool near = nonlinear(trials[i]) && trials[i].reduced_chi2() < nearly_explained;
+    if (near && !leaves_nothing(trials[i])) fit_exactly(trials[i]);
+    fit_fully(trials[i], 6);
+  });
+}
+
+bool any_leaves_nothing(const Trials& trials) { return std::any_of(trials.begin(), trials.end(), leaves_nothing); }
+
+/// All over again for those ahead, and for effects whose own fit has nothing to search in.
+void fit_anew(const FitProblem& problem, Trials& trials) {
+  in_parallel(trials.size(), [&](std::size_t i) {
+    if (i < most_in_full || effect(trials[i].effects.back()).parameters.empty()) fit_from_first_guesses(problem, trials[i]);
   });
 }
 
 /// The best of all sets that have one effect more than `base`: all of them by one linear step, the promising ones in full.
-std::vector<Trial> try_one_more(const DiagnoseProblem& problem, const FitProblem& fit_problem, const Trial& base) {
+Trials try_one_more(const DiagnoseProblem& problem, const FitProblem& fit_problem, const Trial& base) {
   const Strings ids = candidates(problem, base.arrival.joint, base.effects);
   std::vector<std::unique_ptr<Trial>> prepared(ids.size());
-  in_parallel(ids.size(), problem.threads, [&](std::size_t i) {
+  in_parallel(ids.size(), [&](std::size_t i) {
     Strings set = base.effects;
     set.push_back(ids[i]);
     prepared[i] = std::make_unique<Trial>(prepare(fit_problem, base, set));
   });
   std::sort(prepared.begin(), prepared.end(), [](const auto& a, const auto& b) { return a->score > b->score; });
   const double best_score = prepared.empty() ? 0 : prepared.front()->score;
-  std::vector<Trial> promising;
+  Trials linear, others;
   for (const auto& trial : prepared) {
     const bool promises_nothing = effect(trial->effects.back()).parameters.empty();  // it may hold all the same
-    const bool promises = promising.size() < most_refits && trial->score > 0.25 * best_score;
-    if (prepared.size() <= few || promises_nothing || promises) promising.push_back(std::move(*trial));
+    const bool promises = linear.size() + others.size() < most_refits && trial->score > 0.25 * best_score;
+    if (prepared.size() <= few || promises_nothing || promises) (nonlinear(*trial) ? others : linear).push_back(std::move(*trial));
   }
   // Linear effects first, which are an order faster; nonlinear ones where none of those leaves nothing.
-  const auto first_nonlinear = std::stable_partition(promising.begin(), promising.end(), [](const Trial& t) { return !nonlinear(t); });
-  const auto linear = static_cast<std::size_t>(first_nonlinear - promising.begin());
-  fit_those(promising, 0, linear, problem, fit_problem);
-  if (std::none_of(promising.begin(), first_nonlinear, leaves_nothing))
-    fit_those(promising, linear, promising.size(), problem, fit_problem);
-  else
-    promising.erase(first_nonlinear, promising.end());
-  std::sort(promising.begin(), promising.end(), [](const Trial& a, const Trial& b) { return bic_difference(a, b) < 0; });
-  return promising;
+  const bool favours_linear = others.empty() || (!linear.empty() && linear.front().score >= others.front().score);
+  fit_ahead(linear);
+  bool done = any_leaves_nothing(linear);
+  if (favours_linear && !done) {
+    fit_anew(fit_problem, linear);
+    done = any_leaves_nothing(linear);
+  }
+  if (!done) {
+    fit_ahead(others);
+    done = any_leaves_nothing(others);
+    if (!done && !favours_linear) fit_anew(fit_problem, linear);
+    if (!done && !any_leaves_nothing(linear)) fit_anew(fit_problem, others);
+    std::move(others.begin(), others.end(), std::back_inserter(linear));
+  }
+  std::sort(linear.begin(), linear.end(), [](const Trial& a, const Trial& b) { return bic_difference(a, b) < 0; });
+  return linear;
 }
 
 /// Takes away again what the others made superfluous.
@@ -127,6 +130,72 @@ void give_probabilities(std::vector<Candidate>& ranking) {
   for (Candidate& c : ranking) c.probability /= sum;
 }
 
+/// What a user would get who knows of nothing missing. Where something is, the fit is searched no nearer than its systematic errors deserve.
+FitResult describe_baseline(Arrival arrival, const FitProblem& problem, bool something_missing) {
+  if (!something_missing) return describe_fit(arrival, problem);
+  for (RunResidual& run : arrival.joint.runs()) run.temper(1);
+  JointProblem::SolveOptions options;
+  options.iterations = 10;
+  options.tolerance = 1e-3;
+  options.precision = 0.5;
+  options.most_evaluations = 15;
+  solve(arrival, options);
+  return describe_fit(arrival, problem, true);
+}
+
+/// What runs that were not fitted are left with, before and after.
+std::vector<ImprovedRun> predict_unseen(const DiagnoseProblem& problem, const FitProblem& fit_problem, const Arrival& baseline, const Trial& best) {
+  FitProblem after = fit_problem;
+  after.effects = best.effects;
+  const bool leave_out = problem.heldout.empty() && problem.runs.size() > 1 && !best.effects.empty();
+  std::vector<ImprovedRun> unseen(leave_out ? problem.runs.size() : problem.heldout.size());
+  in_parallel(unseen.size(), [&](std::size_t i) {
+    const Run& run = leave_out ? problem.runs[i] : problem.heldout[i];
+    const HeldoutResidual b = leave_out ? predict_left_out(baseline, fit_problem, i) : predict_heldout(baseline, fit_problem, run);
+    const HeldoutResidual a = leave_out ? predict_left_out(best.arrival, after, i) : predict_heldout(best.arrival, after, run);
+    unseen[i] = {run.file, run.channel(b.channel).unit, true, leave_out, b.rms, a.rms, a.noise};
+  });
+  return unseen;
+}
+
+double power_over_noise(const std::vector<ImprovedRun>& runs, double ImprovedRun::* rms) {
+  double sum = 0;
+  for (const ImprovedRun& run : runs) sum += std::pow(run.*rms / run.noise, 2);
+  return sum;
+}
+
+/// Both fits in full, and what they leave of the fitted runs.
+void describe(const DiagnoseProblem& problem, const FitProblem& fit_problem, const Trial& baseline, const Trial& best, Diagnosis& d) {
+  FitProblem after = fit_problem;
+  after.effects = best.effects;
+  Arrival after_arrival = best.arrival;
+  d.before = describe_baseline(baseline.arrival, fit_problem, d.mismatch.found);
+  d.after = best.effects.empty() ? d.before : describe_fit(after_arrival, after);
+  d.bic_after = bic_difference(best, baseline) + (d.bic_before = d.before.bic());
+  for (std::size_t r = 0; r < problem.runs.size(); ++r) {
+    const FittedChannel &b = d.before.runs[r].channels.front(), &a = d.after.runs[r].channels.front();
+    d.runs.push_back({problem.runs[r].file, b.unit, false, false, b.rms_residual, a.rms_residual, std::min(a.noise, b.noise)});
+  }
+}
+
+/// The effects of the best set, and the sets that are as good.
+void name_missing(const Trial& baseline, const Trial& best, Diagnosis& d) {
+  for (const std::string& id : best.effects) {
+    const Effect& e = effect(id);
+    MissingEffect m{id, 0, e.equation, e.source, {}};
+    for (const Candidate& c : d.ranking)
+      if (std::find(c.effects.begin(), c.effects.end(), id) != c.effects.end()) m.probability += c.probability;
+    for (const FittedParameter& p : d.after.parameters)
+      if (p.name.starts_with(id + ".")) m.parameters.push_back(p);
+    d.missing.push_back(m);
+  }
+  const double best_bic = bic_difference(best, baseline);
+  for (const Candidate& c : d.ranking) {
+    const bool other = c.effects != best.effects && !c.effects.empty() && c.effects.size() <= best.effects.size();
+    if (other && c.delta_bic - best_bic < decisive) d.equivalent.push_back(c.effects);
+  }
+}
+
 }  // namespace
 
 Diagnosis diagnose(const DiagnoseProblem& problem) {
@@ -148,7 +217,7 @@ Diagnosis diagnose(const DiagnoseProblem& problem) {
   Trial best = baseline;
   while (best.effects.size() < most_effects && (best.effects.empty() ? d.mismatch.found : best.reduced_chi2() > explained && locate_mismatch(best.arrival.joint).found)) {
     tell(best.effects.empty() ? "trying what may be missing" : "trying what may be missing beside " + best.effects.back());
-    const std::vector<Trial> tried = try_one_more(problem, fit_problem, best);
+    const Trials tried = try_one_more(problem, fit_problem, best);
     for (const Trial& t : tried) d.ranking.push_back({t.effects, t.reduced_chi2(), bic_difference(t, baseline), 0, best.effects.empty() ? t.score : 0});
     if (tried.empty() || bic_difference(tried.front(), best) > -decisive) break;
     best = without_superfluous(fit_problem, tried.front());
@@ -159,39 +228,18 @@ Diagnosis diagnose(const DiagnoseProblem& problem) {
 
   d.remaining = locate_mismatch(best.arrival.joint);
   const bool clean = leaves_nothing(best) || !d.remaining.found;
-  const bool named = !best.effects.empty() && (clean || excess(best) < (1 - nearly_all) * excess(baseline));
-  d.unexplained = d.mismatch.found && !clean;
+  const std::vector<ImprovedRun> unseen = problem.verdict_only ? std::vector<ImprovedRun>{} : predict_unseen(problem, fit_problem, baseline.arrival, best);
+  const bool predicts = best.effects.empty() || power_over_noise(unseen, &ImprovedRun::rms_after) <= power_over_noise(unseen, &ImprovedRun::rms_before);
+  const bool named = !best.effects.empty() && predicts && (clean || excess(best) < (1 - nearly_all) * excess(baseline));
+  d.unexplained = d.mismatch.found && !(clean && predicts);
 
-  tell("describing the result");
-  FitProblem after = fit_problem;
-  after.effects = best.effects;
-  Arrival before_arrival = baseline.arrival, after_arrival = best.arrival;
-  d.before = describe_fit(before_arrival, fit_problem);
-  d.after = best.effects.empty() ? d.before : describe_fit(after_arrival, after);
-  d.bic_after = bic_difference(best, baseline) + (d.bic_before = d.before.bic());
-  if (named) {
-    for (const std::string& id : best.effects) {
-      const Effect& e = effect(id);
-      MissingEffect m{id, 0, e.equation, e.source, {}};
-      for (const Candidate& c : d.ranking)
-        if (std::find(c.effects.begin(), c.effects.end(), id) != c.effects.end()) m.probability += c.probability;
-      for (const FittedParameter& p : d.after.parameters)
-        if (p.name.starts_with(id + ".")) m.parameters.push_back(p);
-      d.missing.push_back(m);
-    }
-    for (const Candidate& c : d.ranking) {
-      const bool same = c.effects == best.effects;
-      if (!same && !c.effects.empty() && c.effects.size() <= best.effects.size() && c.delta_bic - bic_difference(best, baseline) < decisive) d.equivalent.push_back(c.effects);
-    }
+  if (!problem.verdict_only) {
+    tell("describing the result");
+    describe(problem, fit_problem, baseline, best, d);
+    for (const ImprovedRun& run : unseen) d.runs.push_back(run);
+    if (d.unexplained) d.missing_force = missing_forces(best.arrival.joint);
   }
-  for (std::size_t r = 0; r < problem.runs.size(); ++r) {
-    const FittedChannel &b = d.before.runs[r].channels.front(), &a = d.after.runs[r].channels.front();
-    d.runs.push_back({problem.runs[r].file, b.unit, false, b.rms_residual, a.rms_residual, std::min(a.noise, b.noise)});
-  }
-  for (const Run& run : problem.heldout) {
-    const HeldoutResidual b = predict_heldout(baseline.arrival, fit_problem, run), a = predict_heldout(best.arrival, after, run);
-    d.runs.push_back({run.file, run.channel(b.channel).unit, true, b.rms, a.rms, a.noise});
-  }
+  if (named) name_missing(baseline, best, d);
   d.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
   return d;
 }

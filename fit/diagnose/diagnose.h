@@ -8,6 +8,7 @@
 #include "core/run.h"
 #include "core/wagner.h"
 #include "fit/diagnose/mismatch.h"
+#include "fit/diagnose/missing_force.h"
 #include "fit/fit.h"
 
 namespace unrig {
@@ -18,8 +19,8 @@ struct DiagnoseProblem {
   std::vector<Run> runs;
   std::vector<Run> heldout;           ///< not fitted; predicted, with their own motion, initial state and lift slope
   Wagner circulation = Wagner::within_1e4;
+  bool verdict_only = false;          ///< neither predictions, nor descriptions of the fits, nor the missing force
   std::vector<std::string> effects;   ///< candidates; empty: all that can act in these runs
-  int threads = 2;
   std::function<void(const std::string&)> progress;
 };
 
@@ -42,7 +43,8 @@ struct MissingEffect {
 /// One run before and after the effects that were found; residuals of its first fitted channel.
 struct ImprovedRun {
   std::string file, unit;
-  bool heldout = false;
+  bool heldout = false;   ///< not fitted but predicted
+  bool left_out = false;  ///< predicted from the other runs, where no run was held out; it has an entry as a fitted run too
   double rms_before = 0, rms_after = 0, noise = 0;
 };
 
@@ -56,6 +58,7 @@ struct Diagnosis {
   std::vector<ImprovedRun> runs;
   std::vector<Candidate> ranking;
   FitResult before, after;
+  std::vector<MissingForce> missing_force;  ///< where something is unexplained: what would explain it
   double seconds = 0;
 };
 
@@ -64,8 +67,9 @@ struct Diagnosis {
 /// 3. The promising ones are fitted in full, everything free, while the weights return to those of the noise. They are compared by BIC with each run's
 ///    own variance and with as many samples as the remaining colour leaves independent.
 /// 4. While a mismatch remains a further effect is tried beside the best; an effect that others made superfluous is taken away again.
-/// An effect is named only where the set it belongs to leaves nothing (reduced chi-square near one), or nearly all of the excess is gone; otherwise the mismatch is
-/// unexplained.
+/// An effect is named only where the set it belongs to leaves nothing (reduced chi-square near one), or nearly all of the excess is gone, and where runs that were
+/// not fitted are predicted better with it than without: those held out or, where there are none, each fitted run from the others. Otherwise the mismatch is
+/// unexplained, and the force is given that would explain it.
 ///
 /// Throws InputError where a run does not belong to the rig.
 Diagnosis diagnose(const DiagnoseProblem& problem);

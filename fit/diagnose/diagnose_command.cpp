@@ -5,6 +5,7 @@
 
 #include "core/command.h"
 #include "core/effects/effect.h"
+#include "core/in_parallel.h"
 #include "core/text_file.h"
 #include "fit/diagnose/diagnose.h"
 #include "fit/diagnose/diagnosis_files.h"
@@ -21,7 +22,7 @@ int diagnose_command(int argc, char** argv) {
   app.add_option("runs", runs, "run files (CSV) of this rig, in any number")->required();
   app.add_option("--heldout", heldout, "run that is not fitted but predicted (repeatable)");
   app.add_option("--effects", ids, "candidates, separated by commas; without it, all that can act in these runs")->delimiter(',');
-  app.add_option("--threads", problem.threads, "candidates that are fitted at the same time")->capture_default_str()->check(CLI::Range(1, 256));
+  app.add_option_function<int>("--threads", use_threads, "how many threads to work in; without it, as many as the machine has")->check(CLI::Range(1, 256));
   app.add_option("--fit", fit_output, "writes the winning fit too (fit.json), for simulate and correct");
   app.add_option("-o,--output", output, "result (JSON)")->required();
   app.footer("Example:\n  unrig diagnose --rig rig.toml dry_pluck.csv wet_pluck.csv step_a.csv step_b.csv --heldout step_c.csv -o diagnosis.json");

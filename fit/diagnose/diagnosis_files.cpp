@@ -46,9 +46,15 @@ std::string to_json(const Diagnosis& d) {
     missing.push_back({{"effect", m.effect}, {"probability", number(m.probability)}, {"equation", m.equation}, {"source", m.source}, {"parameters", parameters}});
   }
   for (const ImprovedRun& r : d.runs)
-    runs.push_back({{"file", r.file}, {"heldout", r.heldout}, {"rms_before", number(r.rms_before)}, {"rms_after", number(r.rms_after)}, {"noise", number(r.noise)}, {"unit", r.unit}});
+    runs.push_back({{"file", r.file}, {"heldout", r.heldout}, {"left_out", r.left_out}, {"rms_before", number(r.rms_before)}, {"rms_after", number(r.rms_after)}, {"noise", number(r.noise)}, {"unit", r.unit}});
   for (const Candidate& c : d.ranking)
     ranking.push_back({{"effect", set_name(c.effects)}, {"score", number(c.score)}, {"reduced_chi2", number(c.reduced_chi2)}, {"delta_bic", number(c.delta_bic)}, {"probability", number(c.probability)}});
+  ordered_json forces = ordered_json::array();
+  for (const MissingForce& f : d.missing_force) {
+    std::vector<double> value(f.value.begin(), f.value.end());
+    for (double& v : value) v = std::round(v / f.standard_deviation * 100) / 100 * f.standard_deviation;  // to a hundredth of its error
+    forces.push_back({{"run", f.run}, {"unit", "N"}, {"at", "calibration element"}, {"dt", f.dt}, {"standard_deviation", number(f.standard_deviation)}, {"value", value}});
+  }
   ordered_json shifts = ordered_json::array();
   for (const FittedParameter& b : d.before.parameters)
     for (const FittedParameter& a : d.after.parameters)
@@ -64,6 +70,7 @@ std::string to_json(const Diagnosis& d) {
                              {"improvement", {{"bic_before", number(d.bic_before)}, {"bic_after", number(d.bic_after)}, {"runs", runs}}},
                              {"price_of_ignorance", shifts},
                              {"ranking", ranking},
+                             {"missing_force", forces},
                              {"fit", ordered_json::parse(to_json(d.after))}};
   return json.dump(2) + "\n";
 }
@@ -78,9 +85,12 @@ std::string report(const Diagnosis& d) {
   }
   for (const auto& set : d.equivalent) text += "    These runs cannot tell it from " + set_name(set) + ".\n";
   if (d.unexplained) text += "[[Unexplained]]\n    " + d.remaining.summary + "\n";
+  for (const MissingForce& f : d.missing_force)
+    text += fmt::format("    what is left of {} would be explained by a force of {:.3g} N r.m.s. at the calibration element, known to {:.2g} N (diagnosis file: missing_force)\n",
+                        std::filesystem::path(f.run).filename().string(), std::sqrt(f.value.squaredNorm() / static_cast<double>(f.value.size())), f.standard_deviation);
   text += "[[Improvement]]\n";
   for (const ImprovedRun& r : d.runs)
-    text += fmt::format("    {:<20} {:<8} {:9.4g} -> {:9.4g} {} (noise {:.4g})\n", std::filesystem::path(r.file).filename().string(), r.heldout ? "held out" : "fitted", r.rms_before, r.rms_after, r.unit, r.noise);
+    text += fmt::format("    {:<20} {:<8} {:9.4g} -> {:9.4g} {} (noise {:.4g})\n", std::filesystem::path(r.file).filename().string(), r.left_out ? "left out" : r.heldout ? "held out" : "fitted", r.rms_before, r.rms_after, r.unit, r.noise);
   if (d.ranking.size() > 1) {
     text += "[[Tried]] reduced chi-square, BIC against nothing missing\n";
     for (const Candidate& c : d.ranking) text += fmt::format("    {:<36} {:10.4g} {:12.5g}\n", set_name(c.effects), c.reduced_chi2, c.delta_bic);

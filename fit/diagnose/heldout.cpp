@@ -2,6 +2,8 @@
 
 #include <cmath>
 
+#include "fit/undetermined.h"
+
 namespace unrig {
 
 using Eigen::Index;
@@ -34,6 +36,26 @@ HeldoutResidual predict_heldout(const Arrival& arrival, const FitProblem& proble
   result.rms = std::sqrt(sum / std::max(1.0, count));
   result.noise = residual.sigma(0);
   return result;
+}
+
+HeldoutResidual predict_left_out(const Arrival& arrival, const FitProblem& problem, std::size_t run) {
+  const JointProblem& all = arrival.joint;
+  std::vector<RunResidual> others;
+  for (std::size_t r = 0; r < all.runs().size(); ++r)
+    if (r != run) others.push_back(all.runs()[r]);
+  Arrival without{arrival.model, {}, JointProblem(*arrival.model, std::move(others))};
+  const auto left_out = static_cast<int>(run);
+  for (Unknown& u : without.joint.unknowns())
+    for (const Unknown& known : all.unknowns())
+      if (known.parameter == u.parameter && known.run == (u.run >= left_out ? u.run + 1 : u.run)) u.value = known.value;
+  hold_undetermined(without.joint);  // the run may have been the only one that tells
+  JointProblem::SolveOptions options;
+  options.iterations = 12;
+  options.tolerance = 1e-4;
+  options.precision = 0.3;
+  options.most_evaluations = 15;
+  solve(without, options);
+  return predict_heldout(without, problem, all.runs()[run].run());
 }
 
 }  // namespace unrig

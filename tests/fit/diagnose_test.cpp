@@ -5,6 +5,7 @@
 #include <map>
 #include <nlohmann/json.hpp>
 
+#include "core/spectrum.h"
 #include "core/text_file.h"
 #include "fit/diagnose/diagnose.h"
 #include "fit/diagnose/diagnosis_files.h"
@@ -15,10 +16,15 @@ namespace {
 
 const std::string campaigns = std::string(UNRIG_SOURCE_DIR) + "/sample_data/campaigns/";
 
-Diagnosis diagnose_campaign(const std::string& name) {
+DiagnoseProblem fitted_runs(const std::string& name) {
   DiagnoseProblem problem;
   problem.rig = read_rig(campaigns + name + "/rig.toml");
   for (const char* run : {"dry_pluck", "wet_pluck", "step_a", "step_b", "step_c"}) problem.runs.push_back(read_run(campaigns + name + "/" + run + ".csv"));
+  return problem;
+}
+
+Diagnosis diagnose_campaign(const std::string& name) {
+  DiagnoseProblem problem = fitted_runs(name);
   problem.heldout.push_back(read_run(campaigns + name + "/heldout.csv"));
   return diagnose(problem);
 }
@@ -74,6 +80,41 @@ TEST(Diagnose, ShipRollHasQuadraticDampingAndNonlinearStiffness) {
   EXPECT_NE(std::find(found.begin(), found.end(), "cubic-stiffness"), found.end());
   constexpr double degree = 3.14159265358979323846 / 180;
   EXPECT_LT(d.runs.front().rms_after, 0.0186 * degree);
+}
+
+TEST(Diagnose, WithoutAHeldOutRunEachIsPredictedFromTheOthers) {
+  DiagnoseProblem problem = fitted_runs("wave");
+  problem.effects = {"tank-wave", "gauge-drift"};
+  const Diagnosis d = diagnose(problem);
+  ASSERT_EQ(d.missing.size(), 1u);
+  int left_out = 0, steps = 0;
+  for (const ImprovedRun& run : d.runs) {
+    if (!run.left_out) continue;
+    ++left_out;
+    if (run.file.find("step") == std::string::npos) continue;  // a decay's own amplitudes take up some of the wave, and no other run is in air
+    ++steps;
+    EXPECT_GT(run.rms_before, 2 * run.noise) << run.file;
+    EXPECT_LT(run.rms_after, 1.1 * run.noise) << run.file << ": a reduced chi-square of 1.2";
+  }
+  EXPECT_EQ(left_out, 5);
+  EXPECT_EQ(steps, 3);
+}
+
+/// The wave's name withheld: nothing else may be named, and the force that would explain what is left swings at the wave's frequency.
+TEST(Diagnose, WhatNoCandidateExplainsIsGivenAsAForce) {
+  DiagnoseProblem problem = fitted_runs("wave");
+  problem.effects = {"gauge-drift", "torsion-crosstalk", "gauge-lowpass"};
+  const Diagnosis d = diagnose(problem);
+  EXPECT_TRUE(d.missing.empty());
+  EXPECT_TRUE(d.unexplained);
+  const double hz = nlohmann::json::parse(read_text(campaigns + "KEY.json"))["wave"]["parameters"]["wave"]["hz"];
+  const auto step = std::find_if(d.missing_force.begin(), d.missing_force.end(), [](const MissingForce& f) { return f.run.ends_with("step_a.csv"); });
+  ASSERT_NE(step, d.missing_force.end());
+  Eigen::Index line = 0;
+  const double line_hz = 1 / (step->dt * static_cast<double>(step->value.size()));
+  fourier(Eigen::VectorXd(step->value.array() - step->value.mean())).cwiseAbs().maxCoeff(&line);
+  EXPECT_NEAR(static_cast<double>(line) * line_hz, hz, line_hz) << "the record's own resolution";
+  EXPECT_GT(step->value.norm() / std::sqrt(static_cast<double>(step->value.size())), 3 * step->standard_deviation);
 }
 
 TEST(DiagnosisFile, HasWhatTheFormatPromises) {

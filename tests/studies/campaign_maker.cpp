@@ -5,6 +5,7 @@
 #include <stdexcept>
 
 #include "core/simulate.h"
+#include "fit/diagnose/trial_campaign.h"
 #include "tests/support/sample_data.h"
 
 namespace unrig::studies {
@@ -42,28 +43,9 @@ class Noise {
   std::normal_distribution<double> normal_;
 };
 
-/// From 0 to 1 in 0 <= x <= 1 with three derivatives at rest at either end.
-double smooth_ramp(double x) {
-  if (x <= 0) return 0;
-  if (x >= 1) return 1;
-  return x * x * x * x * (35 + x * (-84 + x * (70 - 20 * x)));
-}
-
 void put(Run& run, const std::string& name, const std::string& unit, const VectorXd& value) { run.channels.push_back({name, unit, unit, 1, value, 0}); }
 
 constexpr Index finer = 4;  // the rig answers on a grid finer than the recording's by this
-
-Run every_nth(const Run& fine, Index n) {
-  Run run = fine;
-  run.dt = fine.dt * static_cast<double>(n);
-  for (Channel& c : run.channels) {
-    const Index samples = (c.value.size() + n - 1) / n;
-    VectorXd kept(samples);
-    for (Index k = 0; k < samples; ++k) kept[k] = c.value[n * k];
-    c.value = kept;
-  }
-  return run;
-}
 
 /// What a kind of rig is recorded with.
 struct Setting {
@@ -74,6 +56,7 @@ struct Setting {
 Setting setting_of(RigKind kind) {
   switch (kind) {
     case RigKind::tow_tank: return {0.004, 4.0, 0.55, 0.08, 30};
+    case RigKind::one_mode_cantilever:
     case RigKind::cantilever: return {0.002, 2.0, 1.5, 0.04, 60};
     case RigKind::oscillator: return {0.01, 10.0, 0, 0, 5};
     case RigKind::two_modes: return {0.005, 8.0, 0, 0, 5};
@@ -134,7 +117,7 @@ VectorXd draw(const AeroelasticModel& model, Random& random) {
 }  // namespace
 
 std::string CampaignRecipe::name() const {
-  static const char* const rigs[] = {"tow-tank beam", "cantilever", "oscillator", "two modes"};
+  static const char* const rigs[] = {"tow-tank beam", "cantilever", "oscillator", "two modes", "cantilever of one mode"};
   std::string text = std::string(rigs[static_cast<int>(rig)]) + (noise == NoiseColour::white ? ", white:" : ", coloured:");
   for (const std::string& run : runs) text += " " + run;
   return text;
@@ -182,7 +165,7 @@ Rig rig_of(RigKind kind) {
       rig.normal.flexibility(i, j) = x * x * (3 * y - x) / (6 * bending);
       rig.torsion.flexibility(i, j) = x / twisting;
     }
-  rig.normal.modes = 2;
+  rig.normal.modes = kind == RigKind::one_mode_cantilever ? 1 : 2;
   rig.torsion.modes = 1;
   rig.rigid_from = elements;
   rig.submerged = {5, 6, 7, 8};

@@ -14,7 +14,8 @@ enum class RigKind {
   tow_tank,  ///< the sample campaigns' beam of 17 elements, plucked in air and water, pitched in a stream
   cantilever,  ///< a stout uniform beam of 8 elements in a faster stream
   oscillator,  ///< one mode, plucked, and driven by a measured force
-  two_modes    ///< two modes that one gauge sees, likewise
+  two_modes,   ///< two modes that one gauge sees, likewise
+  one_mode_cantilever  ///< the cantilever with one mode of each kind, in the model and in truth
 };
 
 /// Noise of both channels.

@@ -1,15 +1,12 @@
 #pragma once
-#include <atomic>
-#include <cstdio>
 #include <functional>
 #include <mutex>
 #include <string>
-#include <thread>
-#include <vector>
 
 #include <fmt/format.h>
 
 #include "core/command.h"
+#include "core/in_parallel.h"
 
 namespace unrig::studies {
 
@@ -17,21 +14,15 @@ namespace unrig::studies {
 inline void each(int count, int threads, const std::function<void(int)>& job) {
   Progress progress;
   std::mutex bar;
-  std::atomic<int> next = 0, done = 0;
-  const auto work = [&] {
-    for (int i = next++; i < count; i = next++) {
-      job(i);
-      const std::lock_guard guard(bar);
-      const int finished = ++done;
-      constexpr int width = 40;
-      const auto filled = static_cast<std::size_t>(width * finished / count);
-      progress(fmt::format("[{}{}] {} of {}", std::string(filled, '#'), std::string(width - filled, ' '), finished, count));
-    }
-  };
-  std::vector<std::thread> crew;
-  for (int t = 1; t < threads; ++t) crew.emplace_back(work);
-  work();
-  for (std::thread& member : crew) member.join();
+  int done = 0;
+  use_threads(threads);
+  in_parallel(static_cast<std::size_t>(count), [&](std::size_t i) {
+    job(static_cast<int>(i));
+    const std::lock_guard guard(bar);
+    constexpr int width = 40;
+    const auto filled = static_cast<std::size_t>(width * ++done / count);
+    progress(fmt::format("[{}{}] {} of {}", std::string(filled, '#'), std::string(width - filled, ' '), done, count));
+  });
 }
 
 }  // namespace unrig::studies

@@ -1,0 +1,168 @@
+#include "fit/diagnose/missing_force.h"
+
+#include <Eigen/LU>
+#include <cmath>
+
+#include "core/exact_step.h"
+#include "core/in_parallel.h"
+
+namespace unrig {
+namespace {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::RowVectorXd;
+using Eigen::VectorXd;
+
+/// z = [x; f]: z_{k+1} = F z_k + G w_k, r_k = H z_k + v_k.
+struct Walk {
+  MatrixXd F;
+  VectorXd G;
+  RowVectorXd H;
+};
+
+Walk walk_of(const LinearSystem& system, double dt) {
+  const ExactStep step = exact_step(system, dt);
+  const Index n = system.states();
+  Walk walk{MatrixXd::Zero(n + 1, n + 1), VectorXd(n + 1), RowVectorXd(n + 1)};
+  walk.F.topLeftCorner(n, n) = step.transition.value;
+  walk.F.col(n) << step.input0.value.col(0) + step.input1.value.col(0), 1;
+  walk.G << step.input1.value.col(0), 1;
+  walk.H << system.C.value.row(0), system.D.value(0, 0);
+  return walk;
+}
+
+/// Doubled until it no longer changes: X = Q + A^T X (I + S X)^-1 A.
+MatrixXd riccati(MatrixXd A, MatrixXd S, MatrixXd X) {
+  constexpr int most = 60;
+  for (int i = 0; i < most; ++i) {
+    const MatrixXd inverse = (MatrixXd::Identity(A.rows(), A.cols()) + S * X).inverse();
+    const MatrixXd change = A.transpose() * X * inverse * A;
+    S += A * inverse * S * A.transpose();
+    X += change;
+    A = (A * inverse * A).eval();
+    X = (0.5 * (X + X.transpose())).eval();
+    S = (0.5 * (S + S.transpose())).eval();
+    if (!(change.norm() > 1e-14 * X.norm())) break;
+  }
+  return X;
+}
+
+struct Filter {
+  MatrixXd P;         // covariance of the predicted state
+  VectorXd gain;      // P H^T / variance
+  double variance = 0;  // of the innovations
+};
+
+Filter filter_for(const Walk& walk, double roughness_per_sample, double noise) {
+  Filter f;
+  f.P = riccati(walk.F.transpose(), walk.H.transpose() * walk.H / (noise * noise), roughness_per_sample * roughness_per_sample * walk.G * walk.G.transpose());
+  f.variance = walk.H.dot(f.P * walk.H.transpose()) + noise * noise;
+  f.gain = f.P * walk.H.transpose() / f.variance;
+  return f;
+}
+
+/// Innovations, 0 where there is no sample; the states before each of them where `states` is given.
+VectorXd innovations(const Walk& walk, const Filter& filter, const VectorXd& residual, MatrixXd* states = nullptr) {
+  VectorXd z = VectorXd::Zero(walk.F.rows()), next(z.size()), e(residual.size());
+  if (states) states->resize(z.size(), residual.size());
+  for (Index k = 0; k < residual.size(); ++k) {
+    if (states) states->col(k) = z;
+    e[k] = std::isfinite(residual[k]) ? residual[k] - walk.H.dot(z) : 0;
+    z += filter.gain * e[k];
+    next.noalias() = walk.F * z;
+    z.swap(next);
+  }
+  return e;
+}
+
+/// -2 ln likelihood of the residual for this roughness.
+double deviance(const Walk& walk, double roughness_per_sample, double noise, const VectorXd& residual) {
+  const Filter filter = filter_for(walk, roughness_per_sample, noise);
+  const double n = static_cast<double>(residual.size());
+  return innovations(walk, filter, residual).squaredNorm() / filter.variance + n * std::log(filter.variance);
+}
+
+/// Where a function of one variable is least, between `low` and `high`: a coarse grid, then golden sections around its best.
+template <class Function>
+double least_between(double low, double high, Function f) {
+  constexpr int grid = 12, sections = 12;
+  const double step = (high - low) / grid;
+  double best = low, least = INFINITY;
+  for (int i = 0; i <= grid; ++i)
+    if (const double value = f(low + i * step); value < least) least = value, best = low + i * step;
+  const double golden = 0.5 * (std::sqrt(5.0) - 1);
+  double a = best - step, b = best + step;
+  for (int i = 0; i < sections; ++i) {
+    const double c = b - golden * (b - a), d = a + golden * (b - a);
+    (f(c) < f(d) ? b : a) = f(c) < f(d) ? d : c;
+  }
+  return 0.5 * (a + b);
+}
+
+}  // namespace
+
+MissingForce estimate_force(const LinearSystem& system, double dt, const VectorXd& residual, double noise) {
+  const Walk walk = walk_of(system, dt);
+  const Index n = walk.F.rows(), last = n - 1;
+  // From a force that would change by a thousandth of the noise over the record to one that may change by all of its range at every sample.
+  double range = noise;
+  for (const double r : residual)
+    if (std::isfinite(r)) range = std::max(range, std::abs(r));
+  const double steady = std::abs((walk.H.head(last) * (MatrixXd::Identity(last, last) - walk.F.topLeftCorner(last, last)).fullPivLu().solve(walk.F.col(last).head(last)))(0) + walk.H[last]);
+  const double unit = std::max(steady, 1e-6);
+  const double low = std::log(1e-3 * noise / unit / std::sqrt(static_cast<double>(residual.size()))), high = std::log(10 * range / unit);
+  const double roughness = std::exp(least_between(low, high, [&](double q) { return deviance(walk, std::exp(q), noise, residual); }));
+
+  const Filter filter = filter_for(walk, roughness, noise);
+  MatrixXd states;
+  const VectorXd e = innovations(walk, filter, residual, &states);
+  // Adjoint of the filter, backwards: what later samples say.
+  const MatrixXd kept = MatrixXd::Identity(n, n) - filter.gain * walk.H, carried = walk.F * kept;
+  MissingForce force{"", dt, VectorXd(residual.size()), 0, roughness / std::sqrt(dt)};
+  VectorXd later = VectorXd::Zero(n);
+  for (Index k = residual.size() - 1; k >= 0; --k) {
+    if (std::isfinite(residual[k]))
+      later = (carried.transpose() * later + walk.H.transpose() * (e[k] / filter.variance)).eval();
+    else
+      later = (walk.F.transpose() * later).eval();
+    force.value[k] = states(last, k) + filter.P.row(last).dot(later);
+  }
+  // Its information, doubled to the steady state: L = H^T H / variance + carried^T L carried.
+  MatrixXd L = walk.H.transpose() * walk.H / filter.variance, power = carried;
+  for (int i = 0; i < 40; ++i) {
+    const MatrixXd more = power.transpose() * L * power;
+    L += more;
+    power = (power * power).eval();
+    if (!(more.norm() > 1e-14 * L.norm())) break;
+  }
+  force.standard_deviation = std::sqrt(std::max(0.0, filter.P(last, last) - (filter.P * L * filter.P)(last, last)));
+  return force;
+}
+
+std::vector<MissingForce> missing_forces(const JointProblem& joint) {
+  std::vector<MissingForce> forces(joint.runs().size());
+  in_parallel(forces.size(), [&](std::size_t r) {
+    const RunResidual& run = joint.runs()[r];
+    const Rig& rig = joint.model().rig();
+    if (run.channels().front() != "gauge" || (!rig.is_modal() && rig.calibration_element == 0)) return;
+    const VectorXd theta = joint.theta(r);
+    Conditions conditions = run.conditions();
+    if (conditions.mount || conditions.force) return;  // driven already
+    conditions.force = true;
+    LinearSystem system = joint.model().system(conditions, theta, {"gauge"});
+    for (DualMatrix* m : {&system.A, &system.B, &system.C, &system.D}) m->partial.clear();
+    system.feedback.clear();
+    for (DualMatrix* m : {&system.B, &system.D}) *m = m->block(0, 0, m->rows(), 1);
+    const RunResidual::Prediction p = run.predict(theta);
+    VectorXd left = run.run().channel("gauge").value - p.output.col(0);
+    for (Index k = 0; k < left.size(); ++k)
+      if (!(run.channel_weight(0)[k] > 0)) left[k] = std::nan("");
+    forces[r] = estimate_force(system, run.run().dt, left, run.sigma(0));
+    forces[r].run = run.run().file;
+  });
+  std::erase_if(forces, [](const MissingForce& f) { return f.run.empty(); });
+  return forces;
+}
+
+}  // namespace unrig

@@ -1,0 +1,30 @@
+#pragma once
+#include <Eigen/Core>
+#include <string>
+#include <vector>
+
+#include "fit/joint_problem.h"
+
+namespace unrig {
+
+/// A force at the calibration station that would explain what a fit leaves of one run's gauge.
+struct MissingForce {
+  std::string run;
+  double dt = 0;              ///< s
+  Eigen::VectorXd value;      ///< N, per sample; sees the whole record, before and behind
+  double standard_deviation = 0;  ///< N, of each sample away from the ends
+  double roughness = 0;       ///< N/sqrt(s): what the force changes by in one second, estimated
+};
+
+/// Input estimation: the force is a random walk, x' = A x + B f, df = q dw, gauge residual = C x + D f + noise; q is the one that makes the residual most likely, the
+/// force the mean of all that agree with it (Kalman filter and Bryson-Frazier smoother, both in their steady state, linear in the samples; A. E. Bryson and
+/// M. Frazier, TDR 63-119 (1963) 354; Riccati equation by doubling, B. D. O. Anderson, Int. J. Control 28 (1978) 295). Nonlinear effects at work are left out of the
+/// rig's answer to it.
+///
+/// One for every run of a beam rig with a gauge; none for a rig that is known as modes only and has no force in its recording.
+std::vector<MissingForce> missing_forces(const JointProblem& joint);
+
+/// The same for one residual [N], of a system with one input and one output; the noise's standard deviation in N. Samples that are not finite are skipped.
+MissingForce estimate_force(const LinearSystem& system, double dt, const Eigen::VectorXd& residual, double noise);
+
+}  // namespace unrig

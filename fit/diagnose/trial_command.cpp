@@ -1,0 +1,54 @@
+#include "fit/diagnose/trial_command.h"
+
+#include <CLI/CLI.hpp>
+#include <fmt/format.h>
+
+#include "core/command.h"
+#include "core/effects/effect.h"
+#include "core/error.h"
+#include "core/in_parallel.h"
+#include "core/text_file.h"
+#include "core/units.h"
+#include "fit/diagnose/trial.h"
+
+namespace unrig {
+
+int trial_command(int argc, char** argv) {
+  TrialProblem problem;
+  CLI::App app{"Hides effects in simulated campaigns of a rig and counts how often `unrig diagnose` finds them.", "unrig trial"};
+  std::string rig, output, noise = "0.03 N";
+  std::vector<std::string> ids;
+  app.add_option("--rig", rig, "rig file (TOML)")->required();
+  app.add_option("--effects", ids, "effects to hide in turn, and the candidates, separated by commas; without it, all")->delimiter(',');
+  app.add_option("--trials", problem.trials, "campaigns; every so many-th hides nothing")->capture_default_str()->check(CLI::Range(1, 1000000));
+  app.add_flag("--pairs", problem.pairs, "hide two effects at a time");
+  app.add_option("--seed", problem.seed, "of the random numbers")->capture_default_str();
+  app.add_option("--noise", noise, "standard deviation of the gauge's noise")->capture_default_str();
+  app.add_flag("--outside", problem.outside, "keep what is hidden from the candidates: the right verdict is `unexplained`");
+  app.add_option_function<int>("--threads", use_threads, "how many threads to work in; without it, as many as the machine has")->check(CLI::Range(1, 256));
+  app.add_option("-o,--output", output, "result (JSON)")->required();
+  app.footer("Example:\n  unrig trial --rig rig.toml --effects tank-wave,gauge-lowpass --trials 30 --seed 1 -o trial.json");
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& e) {
+    return app.exit(e) == 0 ? exit_done : exit_wrong_use;
+  }
+  problem.rig = read_rig(rig);
+  for (const std::string& warning : problem.rig.warnings) warn(warning);
+  problem.noise = quantity(noise, "N", {"--noise", 0}, "the noise");
+  if (!(problem.noise > 0)) throw InputError({"--noise", 0}, "noise of " + noise, "wanted more than none", "");
+  try {
+    for (const std::string& id : ids) problem.effects.push_back(effect(id).id);
+  } catch (const std::invalid_argument& e) {
+    throw InputError({"--effects", 0}, e.what(), "wanted some of these", "");
+  }
+  Progress progress;
+  problem.progress = [&](const std::string& what) { progress(what); };
+  const TrialResult result = run_trials(problem);
+  progress.clear();
+  write_text(output, to_json(result));
+  fmt::print("{}", report(result));
+  return exit_done;
+}
+
+}  // namespace unrig

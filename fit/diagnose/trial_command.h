@@ -1,0 +1,8 @@
+#pragma once
+
+namespace unrig {
+
+/// `unrig trial --rig rig.toml [--effects a,b,...] [--trials N] [--seed S] [--noise "0.03 N"] -o trial.json`
+int trial_command(int argc, char** argv);
+
+}  // namespace unrig
