@@ -29,20 +29,26 @@ std::string reason() { return std::strerror(errno); }
 /// An open file that closes itself, so that every way out is clean.
 class OpenFile {
  public:
-  OpenFile(const std::string& path, int flags, mode_t mode = 0) : number_(::open(path.c_str(), flags | O_CLOEXEC, mode)) {}
+  OpenFile() = default;
+  OpenFile(const std::string& path, int flags, mode_t mode = 0) { open(path, flags, mode); }
   ~OpenFile() {
     if (number_ >= 0) ::close(number_);
   }
   OpenFile(const OpenFile&) = delete;
   OpenFile& operator=(const OpenFile&) = delete;
 
+  /// Closes what was open before.
+  void open(const std::string& path, int flags, mode_t mode = 0) {
+    if (number_ >= 0) ::close(number_);
+    number_ = ::open(path.c_str(), flags | O_CLOEXEC, mode);
+  }
   bool is_open() const { return number_ >= 0; }
   int number() const { return number_; }
   /// False with errno where the system could not keep what was written.
   bool close() { return ::close(std::exchange(number_, -1)) == 0; }
 
  private:
-  int number_;
+  int number_ = -1;
 };
 
 std::optional<struct stat> status(const std::string& path) {
@@ -80,27 +86,32 @@ fs::path followed(const std::string& path) {
   return target;
 }
 
-/// A new file beside the target, gone again unless it is renamed over the target.
+/// A new file in the target's folder, gone again unless it is renamed over the target. It has no name until it is whole (O_TMPFILE), so that
+/// a killed process leaves nothing behind; file systems that cannot do that get a named one.
 class TemporaryFile {
  public:
-  TemporaryFile(const fs::path& target, mode_t mode)
-      : target_(target), path_(unused_name(target)), file_(path_, O_WRONLY | O_CREAT | O_EXCL, mode) {
-    created_ = file_.is_open();
+  TemporaryFile(const fs::path& target, mode_t mode) : target_(target), path_(unused_name(target)) {
+    const fs::path folder = target.parent_path();
+    file_.open(folder.empty() ? "." : folder.string(), O_WRONLY | O_TMPFILE, mode);
+    if (file_.is_open() && ::access(link().c_str(), F_OK) == 0) return;
+    file_.open(path_, O_WRONLY | O_CREAT | O_EXCL, mode);
+    named_ = file_.is_open();
   }
   ~TemporaryFile() {
-    if (created_) ::unlink(path_.c_str());
+    if (named_) ::unlink(path_.c_str());
   }
   TemporaryFile(const TemporaryFile&) = delete;
   TemporaryFile& operator=(const TemporaryFile&) = delete;
 
-  /// False with errno where a step fails. fsync comes before the rename: a crash leaves the old file or the whole new one.
+  /// False with errno where a step fails. fsync comes before the name: a crash leaves the old file or the whole new one.
   bool replace_target_with(std::string_view text) {
-    if (!created_ || !write_all(file_.number(), text) || ::fsync(file_.number()) != 0 || !file_.close()) return false;
-    if (::rename(path_.c_str(), target_.c_str()) != 0) return false;
-    created_ = false;
+    if (!file_.is_open() || !write_all(file_.number(), text) || ::fsync(file_.number()) != 0) return false;
+    if (!named_) named_ = ::linkat(AT_FDCWD, link().c_str(), AT_FDCWD, path_.c_str(), AT_SYMLINK_FOLLOW) == 0;
+    if (!named_ || !file_.close() || ::rename(path_.c_str(), target_.c_str()) != 0) return false;
+    named_ = false;
     return true;
   }
-  bool take_mode(mode_t mode) const { return created_ && ::fchmod(file_.number(), mode & 07777) == 0; }
+  bool take_mode(mode_t mode) const { return file_.is_open() && ::fchmod(file_.number(), mode & 07777) == 0; }
 
  private:
   /// Short, so that a target whose name is as long as the system allows can still be written.
@@ -113,11 +124,13 @@ class TemporaryFile {
     } while (fs::exists(fs::symlink_status(name, ignored)));
     return name.string();
   }
+  /// What a file without a name is linked by; absent where /proc is.
+  std::string link() const { return fmt::format("/proc/self/fd/{}", file_.number()); }
 
   fs::path target_;
   std::string path_;
   OpenFile file_;
-  bool created_ = false;
+  bool named_ = false;
 };
 
 /// The rename itself lives in the directory; where a file system cannot flush directories the file is written all the same.

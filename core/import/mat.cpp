@@ -2,6 +2,7 @@
 
 #include <matio.h>
 
+#include <algorithm>
 #include <filesystem>
 #include <memory>
 
@@ -78,6 +79,18 @@ void take(const matvar_t& v, const std::string& name, int depth, Recording& out)
   }
 }
 
+/// Bytes that the variable and what is in it claim to hold.
+double claimed_bytes(const matvar_t& v, int depth = 0) {
+  double elements = 1;
+  for (int d = 0; d < v.rank && v.dims; ++d) elements *= static_cast<double>(v.dims[d]);
+  if (v.class_type != MAT_C_STRUCT && v.class_type != MAT_C_CELL) return elements * std::max(v.data_size, 1);
+  double sum = elements;
+  const std::size_t held = v.data && v.data_size > 0 ? v.nbytes / static_cast<std::size_t>(v.data_size) : 0;
+  for (std::size_t i = 0; i < held && depth < 16; ++i)
+    if (const matvar_t* inner = static_cast<matvar_t* const*>(v.data)[i]) sum += claimed_bytes(*inner, depth + 1);
+  return sum;
+}
+
 }  // namespace
 
 Recording read_mat(const std::string& path) {
@@ -88,8 +101,14 @@ Recording read_mat(const std::string& path) {
   const std::unique_ptr<mat_t, CloseMat> file(Mat_Open(path.c_str(), MAT_ACC_RDONLY));
   if (!file) throw refuse("this is no MATLAB file");
   Recording out{path, "MAT", {}, {}};
+  constexpr double densest = 1032;  // bytes that a byte of deflate can become (RFC 1951: 258 for two bits)
+  const double most = densest * static_cast<double>(std::filesystem::file_size(path));
   while (const std::unique_ptr<matvar_t, FreeVariable> variable{Mat_VarReadNextInfo(file.get())}) {
     const std::string name = variable->name ? variable->name : "";
+    if (claimed_bytes(*variable) > most) {
+      out.warnings.push_back(fmt::format("{}: the variable {} is left out: it claims to be larger than the file can hold", path, name));
+      continue;
+    }
     if (Mat_VarReadDataAll(file.get(), variable.get()) != 0) {
       out.warnings.push_back(fmt::format("{}: the variable {} cannot be read and is left out", path, name));
       continue;

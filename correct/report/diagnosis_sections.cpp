@@ -132,7 +132,7 @@ void add_time_frequency(ReportPage& page, const json& map) {
       heat.z[j][i] = z.is_number() ? z.get<double>() : std::nan("");
     }
   heat.log_z = true;
-  heat.caption = "Before any effect is added. Six decades of power at most.";
+  heat.caption = "Of the best model with nothing added. Higher frequencies hold nothing but noise.";
   page.add_map(heat);
 }
 
@@ -140,11 +140,11 @@ void add_time_frequency(ReportPage& page, const json& map) {
 void add_restoring_force(ReportPage& page, const json& map) {
   const json x = any_of(map, {"displacement", "x"}), y = any_of(map, {"velocity", "y"}), z = any_of(map, {"force", "z"});
   const std::string x_label = labelled("displacement", text_of(map, "displacement_unit")), y_label = labelled("velocity", text_of(map, "velocity_unit")),
-                    z_label = labelled("missing force", text_of(map, "force_unit").empty() ? text_of(map, "unit") : text_of(map, "force_unit"));
+                    z_label = labelled("recording − model", text_of(map, "force_unit").empty() ? text_of(map, "unit") : text_of(map, "force_unit"));
   const bool grid = !z.empty() && z.front().is_array();
   if (z.empty() || (grid ? z.size() != y.size() : z.size() != x.size() || z.size() != y.size())) return page.add_text("Warning: the restoring-force map is incomplete and left out.");
   if (grid) {
-    HeatMap heat{"Restoring force that the model lacks", x_label, y_label, z_label, doubles(x), doubles(y), {}, "", false, true};
+    HeatMap heat{"What the model lacks, by the state of the rig", x_label, y_label, z_label, doubles(x), doubles(y), {}, "Mean over cells of displacement and velocity of the first normal mode, in the best model with nothing added; white where the rig never was.", false, true};
     for (const json& row : z) heat.z.push_back(doubles(row));
     return page.add_map(heat);
   }

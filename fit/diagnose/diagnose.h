@@ -7,6 +7,7 @@
 #include "core/rig.h"
 #include "core/run.h"
 #include "core/wagner.h"
+#include "fit/diagnose/maps.h"
 #include "fit/diagnose/mismatch.h"
 #include "fit/diagnose/missing_force.h"
 #include "fit/fit.h"
@@ -56,6 +57,7 @@ struct Diagnosis {
   Mismatch remaining;                  ///< and where it sits
   double bic_before = 0, bic_after = 0;
   std::vector<ImprovedRun> runs;
+  std::vector<ResidualMaps> maps;      ///< of what the best fit with nothing missing leaves, per fitted run
   std::vector<Candidate> ranking;
   FitResult before, after;
   std::vector<MissingForce> missing_force;  ///< where something is unexplained: what would explain it

@@ -22,6 +22,30 @@ ordered_json mismatch_json(const Mismatch& m) {
   return {{"found", m.found}, {"p_value", number(m.p_value)}, {"runs", m.runs}, {"time", m.time}, {"frequency", m.frequency}, {"summary", m.summary}, {"channels", channels}};
 }
 
+/// Four digits: maps are to look at. NaN becomes null.
+ordered_json list(const Eigen::VectorXd& values) {
+  ordered_json out = ordered_json::array();
+  for (const double x : values) out.push_back(std::isfinite(x) ? ordered_json::parse(fmt::format("{:.4g}", x)) : ordered_json(nullptr));
+  return out;
+}
+
+ordered_json rows(const Eigen::MatrixXd& values) {
+  ordered_json out = ordered_json::array();
+  for (Eigen::Index i = 0; i < values.rows(); ++i) out.push_back(list(values.row(i)));
+  return out;
+}
+
+/// "map": power over bands and windows, and of a run with a mismatch the missing force over velocities and displacements.
+ordered_json map_json(const ResidualMaps& m) {
+  ordered_json map = {{"channel", m.channel}, {"time_frequency", {{"time", list(m.time_frequency.time)}, {"frequency", list(m.time_frequency.frequency)}, {"power", rows(m.time_frequency.power)}, {"unit", "noise = 1"}}}};
+  if (m.force)
+    map["restoring_force"] = {{"displacement", list(m.force->displacement)}, {"displacement_unit", m.force->displacement_unit}, {"velocity", list(m.force->velocity)}, {"velocity_unit", m.force->velocity_unit},
+                              {"force", rows(m.force->force)}, {"force_unit", m.force->force_unit}};
+  return map;
+}
+
+std::string base_name(const std::string& path) { return std::filesystem::path(path).filename().string(); }
+
 std::string set_name(const std::vector<std::string>& effects) { return effects.empty() ? "nothing missing" : fmt::format("{}", fmt::join(effects, " + ")); }
 
 std::string verdict(const Diagnosis& d) {
@@ -45,8 +69,11 @@ std::string to_json(const Diagnosis& d) {
     }
     missing.push_back({{"effect", m.effect}, {"probability", number(m.probability)}, {"equation", m.equation}, {"source", m.source}, {"parameters", parameters}});
   }
-  for (const ImprovedRun& r : d.runs)
+  for (const ImprovedRun& r : d.runs) {
     runs.push_back({{"file", r.file}, {"heldout", r.heldout}, {"left_out", r.left_out}, {"rms_before", number(r.rms_before)}, {"rms_after", number(r.rms_after)}, {"noise", number(r.noise)}, {"unit", r.unit}});
+    for (const ResidualMaps& m : d.maps)
+      if (m.run == r.file && !r.heldout && !r.left_out) runs.back()["map"] = map_json(m);
+  }
   for (const Candidate& c : d.ranking)
     ranking.push_back({{"effect", set_name(c.effects)}, {"score", number(c.score)}, {"reduced_chi2", number(c.reduced_chi2)}, {"delta_bic", number(c.delta_bic)}, {"probability", number(c.probability)}});
   ordered_json forces = ordered_json::array();
@@ -81,16 +108,16 @@ std::string report(const Diagnosis& d) {
   for (const MissingEffect& m : d.missing) {
     text += fmt::format("[[{}]] probability {:.4f} among the sets tried\n    {}    ({})\n", m.effect, m.probability, m.equation, m.source);
     for (const FittedParameter& p : m.parameters)
-      text += fmt::format("    {} = {:.6g} +/- {:.2g} {}{}\n", p.name, p.value, p.std_error, p.unit, p.run.empty() ? "" : " (" + std::filesystem::path(p.run).filename().string() + ")");
+      text += fmt::format("    {} = {:.6g} +/- {:.2g} {}{}\n", p.name, p.value, p.std_error, p.unit, p.run.empty() ? "" : " (" + base_name(p.run) + ")");
   }
   for (const auto& set : d.equivalent) text += "    These runs cannot tell it from " + set_name(set) + ".\n";
   if (d.unexplained) text += "[[Unexplained]]\n    " + d.remaining.summary + "\n";
   for (const MissingForce& f : d.missing_force)
     text += fmt::format("    what is left of {} would be explained by a force of {:.3g} N r.m.s. at the calibration element, known to {:.2g} N (diagnosis file: missing_force)\n",
-                        std::filesystem::path(f.run).filename().string(), std::sqrt(f.value.squaredNorm() / static_cast<double>(f.value.size())), f.standard_deviation);
+                        base_name(f.run), std::sqrt(f.value.squaredNorm() / static_cast<double>(f.value.size())), f.standard_deviation);
   text += "[[Improvement]]\n";
   for (const ImprovedRun& r : d.runs)
-    text += fmt::format("    {:<20} {:<8} {:9.4g} -> {:9.4g} {} (noise {:.4g})\n", std::filesystem::path(r.file).filename().string(), r.left_out ? "left out" : r.heldout ? "held out" : "fitted", r.rms_before, r.rms_after, r.unit, r.noise);
+    text += fmt::format("    {:<20} {:<8} {:9.4g} -> {:9.4g} {} (noise {:.4g})\n", base_name(r.file), r.left_out ? "left out" : r.heldout ? "held out" : "fitted", r.rms_before, r.rms_after, r.unit, r.noise);
   if (d.ranking.size() > 1) {
     text += "[[Tried]] reduced chi-square, BIC against nothing missing\n";
     for (const Candidate& c : d.ranking) text += fmt::format("    {:<36} {:10.4g} {:12.5g}\n", set_name(c.effects), c.reduced_chi2, c.delta_bic);

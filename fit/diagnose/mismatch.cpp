@@ -19,15 +19,6 @@ using Eigen::VectorXd;
 constexpr double significant = 1e-3;
 constexpr double beyond_motion = 1.05;  // a motion that is known to its noise leaves up to a twentieth
 
-/// The residual of one fitted channel in units of its noise, 0 where left out.
-VectorXd left_over(const RunResidual& run, const RunResidual::Prediction& p, std::size_t c) {
-  const VectorXd& measured = run.run().channel(p.channels[c]).value;
-  const VectorXd weight = run.tempered() * run.channel_weight(c);
-  VectorXd left(measured.size());
-  for (Index k = 0; k < left.size(); ++k) left[k] = weight[k] > 0 && std::isfinite(measured[k]) ? weight[k] * (measured[k] - p.output(k, static_cast<Index>(c))) : 0;
-  return left;
-}
-
 double upper_normal(double z) { return 0.5 * std::erfc(z / std::sqrt(2.0)); }
 
 /// The shortest interval of `power` that holds the share `most` of what it has above `floor`.
@@ -84,12 +75,20 @@ std::string describe(const RunResidual& run, const VectorXd& left, Mismatch& mis
 
 }  // namespace
 
+VectorXd standardised_residual(const RunResidual& run, const RunResidual::Prediction& p, std::size_t c) {
+  const VectorXd& measured = run.run().channel(p.channels[c]).value;
+  const VectorXd weight = run.tempered() * run.channel_weight(c);
+  VectorXd left(measured.size());
+  for (Index k = 0; k < left.size(); ++k) left[k] = weight[k] > 0 && std::isfinite(measured[k]) ? weight[k] * (measured[k] - p.output(k, static_cast<Index>(c))) : 0;
+  return left;
+}
+
 std::array<double, 2> residual_power(const JointProblem& joint, std::size_t r) {
   const RunResidual& run = joint.runs()[r];
   const RunResidual::Prediction p = run.predict(joint.theta(r));
   double sum = 0, count = 0;
   for (std::size_t c = 0; c < p.channels.size(); ++c) {
-    const VectorXd left = left_over(run, p, c);
+    const VectorXd left = standardised_residual(run, p, c);
     sum += left.squaredNorm();
     count += static_cast<double>((left.array() != 0).count());
   }
@@ -104,7 +103,7 @@ Mismatch locate_mismatch(const JointProblem& joint) {
     const RunResidual& run = joint.runs()[r];
     const RunResidual::Prediction p = run.predict(joint.theta(r));
     for (std::size_t c = 0; c < p.channels.size(); ++c) {
-      VectorXd left = left_over(run, p, c);
+      VectorXd left = standardised_residual(run, p, c);
       // In units of its own white part, where that can be told: the assumed level may be off by a few per cent.
       const double count = static_cast<double>((left.array() != 0).count());
       ChannelMismatch m{run.run().file, p.channels[c]};

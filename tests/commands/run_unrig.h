@@ -1,6 +1,7 @@
 #pragma once
 #include <gtest/gtest.h>
 #include <spawn.h>
+#include <sys/resource.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -20,6 +21,7 @@ namespace unrig::test {
 struct Finished {
   int status = -1;  ///< exit status; -1 where it did not end by itself
   std::string out, err;
+  long peak_memory = 0;  ///< KB
 };
 
 inline std::string whole_file(const std::string& path) {
@@ -49,7 +51,9 @@ inline Finished run_unrig(const TemporaryDirectory& directory, const std::vector
     return finished;
   }
   int status = 0;
-  if (::waitpid(child, &status, 0) == child && WIFEXITED(status)) finished.status = WEXITSTATUS(status);
+  rusage used{};
+  if (::wait4(child, &status, 0, &used) == child && WIFEXITED(status)) finished.status = WEXITSTATUS(status);
+  finished.peak_memory = used.ru_maxrss;
   finished.out = whole_file(out);
   finished.err = whole_file(err);
   return finished;

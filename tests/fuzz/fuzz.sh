@@ -14,7 +14,7 @@ tables="core/toml_table.cpp core/units.cpp"
 libraries="-lfmt"
 case "$target" in
   run) sources="$sources $tables core/run.cpp core/csv_table.cpp core/time_grid.cpp" libraries="-lfmt -ltomlplusplus -ludunits2" ;;
-  rig) sources="$sources $tables $(echo core/rig*.cpp) core/flexibility.cpp core/beam_flexibility.cpp" libraries="-lfmt -ltomlplusplus -ludunits2" ;;
+  rig) sources="$sources $tables core/rig.cpp core/rig_chain.cpp core/flexibility.cpp core/beam_flexibility.cpp" libraries="-lfmt -ltomlplusplus -ludunits2" ;;
   tdms) sources="$sources core/import/tdms.cpp core/import/tdms_scaling.cpp core/import/bridge.cpp" ;;
   uff) sources="$sources core/import/uff.cpp" ;;
   mat) sources="$sources core/import/mat.cpp" libraries="-lfmt -lmatio" ;;
