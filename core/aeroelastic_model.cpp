@@ -280,13 +280,18 @@ std::vector<std::string> AeroelasticModel::output_channels(const Run& run) const
 }
 
 LinearSystem AeroelasticModel::system(const Conditions& conditions, const VectorXd& theta, const std::vector<std::string>& channels) const {
-  if (effects_.empty()) return rig_.is_modal() ? modal_system(conditions, theta, channels) : beam_system(conditions, theta, channels);
+  const auto gauge = std::find(channels.begin(), channels.end(), "gauge");
+  const auto amplify = [&](LinearSystem s) {
+    if (gauge != channels.end())
+      for (const GaugeFilter& filter : rig_.gauge_filters) append_gauge_filter(s, gauge - channels.begin(), filter);
+    return s;
+  };
+  if (effects_.empty()) return rig_.is_modal() ? modal_system(conditions, theta, channels) : amplify(beam_system(conditions, theta, channels));
 
   Conditions with_ports = conditions;
   with_ports.force = with_ports.mount = with_ports.ports = true;
   LinearSystem system = rig_.is_modal() ? modal_system(with_ports, theta, channels) : beam_system(with_ports, theta, channels);
   const auto strips = static_cast<Index>(rig_.submerged.size());
-  const auto gauge = std::find(channels.begin(), channels.end(), "gauge");
   Index first = theta.size();
   for (const std::string& id : effects_) first -= static_cast<Index>(effect(id).parameters.size());
   for (const std::string& id : effects_) {
@@ -295,6 +300,7 @@ LinearSystem AeroelasticModel::system(const Conditions& conditions, const Vector
     if (e.acts(conditions)) e.apply(system, context);
     first += static_cast<Index>(e.parameters.size());
   }
+  system = amplify(std::move(system));
   keep_inputs(system, conditions);
   return system;
 }

@@ -64,6 +64,12 @@ DualMatrix DualMatrix::block(Index row, Index col, Index rows, Index cols) const
   return part;
 }
 
+DualMatrix DualMatrix::grown(Index rows, Index cols) const {
+  DualMatrix larger(MatrixXd::Zero(rows, cols), parameters());
+  larger.set_block(0, 0, *this);
+  return larger;
+}
+
 void DualMatrix::set_block(Index row, Index col, const DualMatrix& part) {
   value.block(row, col, part.rows(), part.cols()) = part.value;
   if (part.parameters() > parameters()) partial.resize(part.partial.size());

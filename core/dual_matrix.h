@@ -26,6 +26,8 @@ struct DualMatrix {
   void add_partial(Eigen::Index j, const Eigen::MatrixXd& change);
   /// The sub-block, with its partials.
   DualMatrix block(Eigen::Index row, Eigen::Index col, Eigen::Index rows, Eigen::Index cols) const;
+  /// This in the top left of a larger matrix of zeros.
+  DualMatrix grown(Eigen::Index rows, Eigen::Index cols) const;
   /// Writes `part` (and its partials) into the block at (row, col).
   void set_block(Eigen::Index row, Eigen::Index col, const DualMatrix& part);
   void set_block(Eigen::Index row, Eigen::Index col, const Eigen::MatrixXd& constant) { value.block(row, col, constant.rows(), constant.cols()) = constant; }

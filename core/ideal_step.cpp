@@ -3,6 +3,7 @@
 #include <Eigen/Eigenvalues>
 #include <Eigen/LU>
 #include <stdexcept>
+#include <vector>
 
 namespace unrig {
 namespace {
@@ -15,6 +16,7 @@ using Eigen::VectorXd;
 
 /// The system without its prescribed pitch, and how angle, rate and acceleration of the pitch enter it.
 struct Driven {
+  std::vector<Index> states;  // free ones, then those of a filter
   MatrixXd A, C;
   VectorXd angle, rate, acceleration;                       // into the free states
   VectorXd output_angle, output_rate, output_acceleration;  // straight into the outputs
@@ -22,11 +24,13 @@ struct Driven {
 
 Driven driven(const LinearSystem& system) {
   if (system.motion < 0) throw std::invalid_argument("an ideal step needs a system with prescribed pitch");
-  const Index n = system.free_states(), p = system.motion;
-  const MatrixXd& a = system.A.value;
-  const MatrixXd& c = system.C.value;
-  return {a.topLeftCorner(n, n), c.leftCols(n), a.col(p).head(n), a.col(p + 1).head(n),
-          a.col(p + 2).head(n),  c.col(p),      c.col(p + 1),     c.col(p + 2)};
+  const Index p = system.motion;
+  std::vector<Index> states;
+  for (Index i = 0; i < system.states(); ++i)
+    if (i < p || i > p + 2) states.push_back(i);
+  const MatrixXd &a = system.A.value, &c = system.C.value;
+  const auto enters = [&](Index order) -> VectorXd { return a(states, p + order); };
+  return {states, a(states, states), c(Eigen::all, states), enters(0), enters(1), enters(2), c.col(p), c.col(p + 1), c.col(p + 2)};
 }
 
 VectorXd value_at(const PoleExpansion& expansion, const VectorXcd& pole, double t) {
@@ -42,7 +46,7 @@ VectorXd IdealStep::state_at(double t) const { return value_at(state, pole, t); 
 VectorXd step_jump(const LinearSystem& system) {
   const Driven d = driven(system);
   VectorXd jump = VectorXd::Zero(system.states());
-  jump.head(d.A.rows()) = d.rate + d.A * d.acceleration;
+  jump(d.states) = d.rate + d.A * d.acceleration;
   jump[system.motion] = 1;
   return jump;
 }

@@ -21,9 +21,9 @@ struct PoleExpansion {
 /// The coupled rig's answer to an instantaneous step of the shaft (seed, Eq. 3.18-3.20): p = step, p' = delta, p'' = delta'.
 struct IdealStep {
   Eigen::VectorXcd pole;  ///< 1/s; complex ones in conjugate pairs
-  PoleExpansion state;    ///< the free states of the system, in their order
+  PoleExpansion state;    ///< the states of the system but those of the pitch, in their order
   PoleExpansion output;   ///< its outputs
-  Eigen::VectorXd start;  ///< the free states just after the step, without their delta functions
+  Eigen::VectorXd start;  ///< those states just after the step, without their delta functions
 
   /// The smooth part at t > 0; at t = 0 its limit from the right.
   Eigen::VectorXd output_at(double t) const;

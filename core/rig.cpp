@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "core/rig_chain.h"
+#include "core/rig_gauge.h"
 #include "core/text_file.h"
 #include "core/toml_table.h"
 #include "core/units.h"
@@ -88,7 +89,7 @@ void take_submerged(const TomlTable& submerged, Rig& rig) {
 }
 
 void take_gauge(const TomlTable& gauge, Rig& rig) {
-  gauge.allow_only({"element", "calibration_element"});
+  gauge.allow_only({"element", "calibration_element", "calibration_uncertainty", "lowpass", "response", "delay"});
   rig.gauge_element = element_number(gauge, "element", rig.station.size());
   rig.calibration_element = element_number(gauge, "calibration_element", rig.station.size());
   if (rig.calibration_element <= rig.gauge_element) {
@@ -96,6 +97,7 @@ void take_gauge(const TomlTable& gauge, Rig& rig) {
                fmt::format("the dead weights hung at element {}, the gauge sits at element {}", rig.calibration_element, rig.gauge_element),
                "wanted gauge.calibration_element outboard of gauge.element", "Weights inboard of the bridge do not bend it.");
   }
+  take_gauge_channel(gauge, rig);
 }
 
 SensorKind sensor_kind(const TomlTable& sensor) {

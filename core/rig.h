@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "core/error.h"
+#include "core/gauge_filter.h"
 
 namespace unrig {
 
@@ -51,6 +52,8 @@ struct Rig {
   double strip_length = 0;      ///< m
   int gauge_element = 0;        ///< from 1; 0: the rig has no gauge
   int calibration_element = 0;  ///< from 1
+  double calibration_uncertainty = 0;        ///< of the gauge, relative, one standard deviation
+  std::vector<GaugeFilter> gauge_filters;    ///< between bridge and record, where they are known
 
   std::vector<Sensor> sensors;
   std::vector<ModalMode> modal;
@@ -72,6 +75,14 @@ struct Rig {
 ///
 ///     flexibility.std_percent = 2.0        # one standard deviation, in percent of every entry; or
 ///     flexibility.std_rows = [[..], ..]    # of each entry, in the unit and scale of flexibility.rows
+///
+/// How well the gauge was calibrated, and an amplifier in its channel that is known; simulate, fit and correct take account of it (core/rig_gauge.h):
+///
+///     [gauge]
+///     calibration_uncertainty = 0.005      # one standard deviation, as a fraction of the reading
+///     lowpass = { order = 2, cutoff = "30 Hz", damping_ratio = 0.7 }   # order 1 has no damping ratio; default 1/sqrt(2)
+///     response = "amplifier.csv"           # measured: columns frequency [Hz], gain [1], phase [deg]; beside the rig file
+///     delay = "2 ms"                       # the gauge's column is late
 ///
 /// A rig *from its drawings*, without `flexibility`, by virtual work (core/beam_flexibility.h):
 ///

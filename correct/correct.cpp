@@ -171,7 +171,7 @@ void describe_run(const CorrectProblem& problem, CorrectResult& result) {
   result.semichords_per_second = run.speed / rig.semichord();
   result.force_per_coefficient = run.density * run.speed * run.speed * rig.semichord() * rig.strip_length * static_cast<double>(rig.submerged.size());
   result.gauge = run.channel("gauge").value;
-  result.calibration_uncertainty = problem.calibration_uncertainty;
+  result.calibration_uncertainty = problem.calibration_uncertainty > 0 ? problem.calibration_uncertainty : rig.calibration_uncertainty;
   result.imposed = problem.imposed;
   result.warnings = run.warnings;
 }

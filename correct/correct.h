@@ -15,7 +15,7 @@ struct CorrectProblem {
   Rig rig;
   FittedRig fit;
   Run run;
-  double calibration_uncertainty = 0;  ///< of the gauge, relative, one standard deviation
+  double calibration_uncertainty = 0;  ///< of the gauge, relative, one standard deviation; 0: the rig's
   Imposed imposed = {};                ///< on the indicial response
 };
 

@@ -7,8 +7,21 @@
 #include "core/text_file.h"
 #include "correct/correct.h"
 #include "correct/corrected_files.h"
+#include "correct/modal_load.h"
 
 namespace unrig {
+
+namespace {
+
+template <class Result>
+int finish(const Result& result, const std::string& output) {
+  for (const std::string& warning : result.warnings) warn(warning);
+  write_text(output, to_csv(result));
+  fmt::print("{}", report(result));
+  return exit_done;
+}
+
+}  // namespace
 
 int correct_command(int argc, char** argv) {
   CLI::App app{"Takes the rig out of a gauge record: the load of a rigid rig, its circulatory part, and the indicial response.", "unrig correct"};
@@ -19,7 +32,7 @@ int correct_command(int argc, char** argv) {
   app.add_option("run", run_path, "run file (CSV) with angle and gauge, in a stream")->required();
   app.add_option("-o,--output", output, "corrected record (CSV)")->required();
   app.add_option("--indicial", indicial, "indicial response (CSV)");
-  app.add_option("--calibration-error", calibration, "relative standard deviation of the gauge's calibration")
+  app.add_option("--calibration-error", calibration, "relative standard deviation of the gauge's calibration, in place of the rig file's")
       ->check(CLI::Range(0.0, 1.0));
   Imposed imposed;
   app.add_flag("--monotone", imposed.monotone, "impose an indicial response that never falls (else only tested)");
@@ -30,12 +43,15 @@ int correct_command(int argc, char** argv) {
   } catch (const CLI::ParseError& e) {
     return app.exit(e) == 0 ? exit_done : exit_wrong_use;
   }
-  const CorrectResult result = correct({read_rig(rig_path), read_fit(fit_path), read_run(run_path), calibration, imposed});
-  for (const std::string& warning : result.warnings) warn(warning);
-  write_text(output, to_csv(result));
+  const CorrectProblem problem{read_rig(rig_path), read_fit(fit_path), read_run(run_path), calibration, imposed};
+  if (problem.rig.is_modal()) {
+    if (imposed.any() || !indicial.empty())
+      throw InputError({rig_path, 0}, "a rig known only as modes", "wanted a rig with a section for an indicial response", "Leave out --indicial, --monotone and --at-step.");
+    return finish(modal_load(problem), output);
+  }
+  const CorrectResult result = correct(problem);
   if (!indicial.empty()) write_text(indicial, to_indicial_csv(result));
-  fmt::print("{}", report(result));
-  return exit_done;
+  return finish(result, output);
 }
 
 }  // namespace unrig

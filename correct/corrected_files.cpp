@@ -92,7 +92,7 @@ std::string uncertainty_report(const CorrectResult& r) {
   for (Index s = 0; s < sources; ++s) text += fmt::format(" {} {:.2g}{}", source_names[static_cast<std::size_t>(s)], r.circulatory.by_source(last, s), s + 1 < sources ? "," : "\n");
   text += fmt::format("        95 % bands       1.96 standard deviations for a point, {:.2f} for the whole load, {:.2f} for the whole response\n", r.circulatory.simultaneous,
                       r.indicial.uncertainty.simultaneous);
-  if (r.calibration_uncertainty == 0) text += "        calibration      taken as exact: no --calibration-error is given\n";
+  if (r.calibration_uncertainty == 0) text += "        calibration      taken as exact: neither --calibration-error nor calibration_uncertainty in the rig file\n";
   const auto change = [&](const Eigen::VectorXd& other) { return (other - r.indicial.value).cwiseAbs().maxCoeff(); };
   text += fmt::format("    regularisation       amplitudes within 0 +/- {:.3g} by evidence; {:.1f} of {} determined by the data\n", r.prior_amplitude, r.determined, r.amplitudes);
   text += fmt::format("        sensitivity      half its weight moves the response by at most {:.2g}, twice by {:.2g}\n", change(r.indicial.half_weight),

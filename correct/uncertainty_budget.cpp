@@ -145,8 +145,9 @@ double curve_length(const MatrixXd& rows) {
   return length;
 }
 
-double simultaneous_factor(const MatrixXd& rows) {
-  const double length = curve_length(rows);
+double simultaneous_factor(const MatrixXd& rows) { return simultaneous_factor_of_length(curve_length(rows)); }
+
+double simultaneous_factor_of_length(double length) {
   const auto beyond = [&](double c) { return length / std::numbers::pi * std::exp(-c * c / 2) + std::erfc(c / std::numbers::sqrt2); };
   double low = 1, high = 10;
   while (high - low > 1e-6) (beyond((low + high) / 2) > 0.05 ? low : high) = (low + high) / 2;

@@ -52,7 +52,8 @@ class UncertaintyBudget {
 /// kappa the length of the curve on the unit sphere, sum of the angles between neighbours (J. Sun and C. R. Loader, Ann. Statist. 22 (1994) 1328, Eq. 2.2; an upper bound
 /// by D. Q. Naiman, Ann. Statist. 14 (1986) 896). `rows`: one per point, rows times their transpose the covariance.
 double simultaneous_factor(const Eigen::MatrixXd& rows);
-/// That kappa.
+/// The same for that kappa, and kappa itself.
+double simultaneous_factor_of_length(double length);
 double curve_length(const Eigen::MatrixXd& rows);
 
 }  // namespace unrig

@@ -8,13 +8,6 @@ namespace {
 using Eigen::Index;
 using Eigen::MatrixXd;
 
-/// `a` in the top left of a larger matrix of zeros, with its partials.
-DualMatrix grown(const DualMatrix& a, Index rows, Index cols) {
-  DualMatrix larger(MatrixXd::Zero(rows, cols), a.parameters());
-  larger.set_block(0, 0, a);
-  return larger;
-}
-
 DualMatrix columns_of(const DualMatrix& a, const std::vector<Index>& columns) {
   DualMatrix picked(MatrixXd(a.rows(), static_cast<Index>(columns.size())), a.parameters());
   for (std::size_t i = 0; i < columns.size(); ++i) picked.set_block(0, static_cast<Index>(i), a.block(0, columns[i], a.rows(), 1));
@@ -23,10 +16,10 @@ DualMatrix columns_of(const DualMatrix& a, const std::vector<Index>& columns) {
 
 Index append(LinearSystem& system, const DualMatrix& F) {
   const Index n = system.states(), k = F.rows();
-  system.A = grown(system.A, n + k, n + k);
+  system.A = system.A.grown(n + k, n + k);
   system.A.set_block(n, n, F);
-  system.B = grown(system.B, n + k, system.B.cols());
-  system.C = grown(system.C, system.C.rows(), n + k);
+  system.B = system.B.grown(n + k, system.B.cols());
+  system.C = system.C.grown(system.C.rows(), n + k);
   for (Index i = 0; i < k; ++i) system.exogenous.push_back(n + i);
   return n;
 }
@@ -48,31 +41,11 @@ void append_strip_signal(LinearSystem& system, const EffectContext& c, const Dua
   append_signal(system, F, strips, DualMatrix(spread, c.theta.size()));
 }
 
-void append_gauge_filter(LinearSystem& system, const EffectContext& c, const DualMatrix& F, const DualMatrix& g, const Eigen::RowVectorXd& h, double direct) {
-  const Index n = system.states(), k = F.rows(), inputs = system.B.cols(), row = c.gauge;
-  const DualMatrix bridge = system.C.block(row, 0, 1, n), bridge_inputs = system.D.block(row, 0, 1, inputs);
-  system.A = grown(system.A, n + k, n + k);
-  system.A.set_block(n, n, F);
-  system.A.set_block(n, 0, g * bridge);
-  system.B = grown(system.B, n + k, inputs);
-  if (inputs > 0) system.B.set_block(n, 0, g * bridge_inputs);
-  system.C = grown(system.C, system.C.rows(), n + k);
-  const auto put = [row](DualMatrix& whole, Index column, const DualMatrix& part) {
-    for (MatrixXd& p : whole.partial)
-      if (p.size() > 0) p.block(row, column, 1, part.cols()).setZero();
-    whole.set_block(row, column, part);
-  };
-  put(system.C, 0, direct * bridge);
-  put(system.C, n, DualMatrix(h));
-  if (inputs > 0) put(system.D, 0, direct * bridge_inputs);
-  for (Index i = 0; i < k; ++i) system.settling.push_back(n + i);
-}
-
 void append_feedback(LinearSystem& system, const DualMatrix& direction, Feedback feedback) {
   for (DualMatrix* m : {&system.B, &system.D}) {
     const DualMatrix push = *m * direction;
     const Index columns = m->cols();
-    *m = grown(*m, m->rows(), columns + 1);
+    *m = m->grown(m->rows(), columns + 1);
     m->set_block(0, columns, push);
   }
   system.feedback.push_back(std::move(feedback));

@@ -1,4 +1,5 @@
 #include "core/effects/list.h"
+#include "core/gauge_filter.h"
 
 namespace unrig {
 
@@ -17,17 +18,8 @@ Effect channel_delay() {
   e.on_modal_rigs = false;
   e.apply = [](LinearSystem& system, const EffectContext& c) {
     if (c.gauge < 0) return;
-    // Time in units of tau: P(-x)/P(x), P(x) = 1 + x/2 + x^2/10 + x^3/120, in controllable form; everything scales with 1/tau.
-    const double tau = c.parameter(0);
-    const Eigen::Matrix3d F = (Eigen::Matrix3d() << 0, 1, 0, 0, 0, 1, -120, -60, -12).finished();
-    const Eigen::Vector3d g(0, 0, 1);
-    const Eigen::RowVector3d h(240, 0, 24);  // (P(-x) + P(x)) / (P(x)/120): the all-pass is this less one
-    const auto over_tau = [&](const Eigen::MatrixXd& m) {
-      DualMatrix scaled(m / tau, c.theta.size());
-      scaled.add_partial(c.first_parameter, -m / (tau * tau));
-      return scaled;
-    };
-    append_gauge_filter(system, c, over_tau(F), over_tau(g), h, -1);
+    constexpr int order = 3;
+    append_gauge_filter(system, c.gauge, delay(c.parameter(0), order, {c.first_parameter, c.theta.size()}));
   };
   return e;
 }

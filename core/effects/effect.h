@@ -63,10 +63,6 @@ Eigen::Index append_signal(LinearSystem& system, const DualMatrix& F, const std:
 /// append_signal for a force that is spread evenly over the strips: `read` z newtons in all.
 void append_strip_signal(LinearSystem& system, const EffectContext& context, const DualMatrix& F, const Eigen::RowVectorXd& read);
 
-/// Puts a filter z' = F z + g y, y_f = h z + direct y between the bridge and the gauge's channel. It is at rest where the rig is, and in an unknown
-/// state where the run starts anyhow.
-void append_gauge_filter(LinearSystem& system, const EffectContext& context, const DualMatrix& F, const DualMatrix& g, const Eigen::RowVectorXd& h, double direct);
-
 /// A nonlinear force: f(z) times `direction` (ports x 1, over all input columns of `system`, with partials), z = sees x.
 void append_feedback(LinearSystem& system, const DualMatrix& direction, Feedback feedback);
 

@@ -1,13 +1,12 @@
-#include <cmath>
 #include <numbers>
 
 #include "core/effects/list.h"
+#include "core/gauge_filter.h"
 
 namespace unrig {
 
 /// Amplifier or anti-alias filter in the gauge channel, a second-order low-pass: y_f'' + 2 zeta w_c y_f' + w_c^2 y_f = w_c^2 y, w_c = 2 pi f_c, y the moment at the bridge.
-/// f_c [Hz] and zeta are shared; zeta = 1/sqrt(2) is Butterworth's, a large zeta makes it first order with its corner at f_c / (2 zeta). The filter is at
-/// rest where the rig is, and in an unknown state where the run starts anyhow.
+/// f_c [Hz] and zeta are shared; zeta = 1/sqrt(2) is Butterworth's, a large zeta makes it first order with its corner at f_c / (2 zeta).
 /// Source: S. Butterworth, Wireless Engineer 7 (1930) 536.
 Effect gauge_lowpass() {
   Effect e;
@@ -20,14 +19,7 @@ Effect gauge_lowpass() {
   e.acts = [](const Conditions&) { return true; };
   e.apply = [](LinearSystem& system, const EffectContext& c) {
     if (c.gauge < 0) return;
-    const Eigen::Index parameters = c.theta.size(), p = c.first_parameter;
-    const double per_hertz = 2 * std::numbers::pi, w = per_hertz * c.parameter(0), zeta = c.parameter(1);
-    DualMatrix filter((Eigen::Matrix2d() << 0, 1, -w * w, -2 * zeta * w).finished(), parameters);
-    filter.add_partial(p, (Eigen::Matrix2d() << 0, 0, -2 * w * per_hertz, -2 * zeta * per_hertz).finished());
-    filter.add_partial(p + 1, (Eigen::Matrix2d() << 0, 0, 0, -2 * w).finished());
-    DualMatrix drive(Eigen::Vector2d(0, w * w), parameters);
-    drive.add_partial(p, Eigen::Vector2d(0, 2 * w * per_hertz));
-    append_gauge_filter(system, c, filter, drive, Eigen::RowVector2d(1, 0), 0);
+    append_gauge_filter(system, c.gauge, low_pass(c.parameter(0), c.parameter(1), {c.first_parameter, c.theta.size()}));
   };
   return e;
 }

@@ -4,10 +4,10 @@
 
 #include <Eigen/LU>
 #include <cmath>
-#include <numbers>
 
 #include "core/simulate.h"
 #include "fit/fit.h"
+#include "tests/support/band.h"
 #include "tests/support/shared_data.h"
 
 namespace unrig {
@@ -15,7 +15,9 @@ namespace {
 
 using Eigen::Index;
 using Eigen::VectorXd;
-using std::numbers::pi;
+using test::below;
+using test::part;
+using test::rms;
 
 const FittedParameter& parameter(const FitResult& result, const std::string& name) {
   for (const FittedParameter& p : result.parameters)
@@ -23,32 +25,6 @@ const FittedParameter& parameter(const FitResult& result, const std::string& nam
   ADD_FAILURE() << "no parameter " << name;
   return result.parameters.front();
 }
-
-/// Samples [first, last) as a run of their own.
-unrig::Run part(const unrig::Run& whole, Index first, Index last) {
-  unrig::Run run = whole;
-  run.start = whole.time(first);
-  for (Channel& c : run.channels) c.value = VectorXd(c.value.segment(first, last - first));
-  return run;
-}
-
-/// Butterworth's low-pass of second order, forward and backward: no phase. Source: bilinear transform, A. V. Oppenheim and R. W. Schafer, 7.1.
-VectorXd below(double cutoff, const VectorXd& x, double dt) {
-  const double k = std::tan(pi * cutoff * dt), norm = 1 / (1 + std::sqrt(2.0) * k + k * k);
-  const auto filter = [&](const VectorXd& in) {
-    VectorXd out(in.size());
-    double x1 = in[0], x2 = in[0], y1 = in[0], y2 = in[0];
-    for (Index i = 0; i < in.size(); ++i) {
-      out[i] = norm * (k * k * (in[i] + 2 * x1 + x2) - 2 * (k * k - 1) * y1 - (1 - std::sqrt(2.0) * k + k * k) * y2);
-      x2 = x1, x1 = in[i], y2 = y1, y1 = out[i];
-    }
-    return out;
-  };
-  const VectorXd forward = filter(x);
-  return filter(forward.reverse()).reverse();
-}
-
-double rms(const VectorXd& x) { return std::sqrt(x.squaredNorm() / static_cast<double>(x.size())); }
 
 TEST(FitRecording, ForcePlateThatMovesItselfIsPredicted) {
   // Nothing stands on the plate: whatever it reads is its own inertia. Fitted to the first half, with the second predicted from the measured
