@@ -12,10 +12,10 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-constexpr int order = 6;
+constexpr int order = 4;
 constexpr Index group_size = 5;
 
-/// Sixth differences of the fine coefficients over everything a window touches, one row each, over the motion unknowns.
+/// Fourth differences of the fine coefficients over everything a window touches, one row each, over the motion unknowns.
 MatrixXd differences(const MotionBasis& motion, const MotionBasis::Window& window) {
   const Index s = window.stride, first = std::max<Index>(0, window.knots.first - order * s), last = std::min(motion.samples(), window.knots.last + (order + 4) * s);
   MatrixXd c(last - first, motion.unknowns());
@@ -27,6 +27,18 @@ MatrixXd differences(const MotionBasis& motion, const MotionBasis::Window& windo
   return c;
 }
 
+/// Each group at least as wide as the wider of its neighbours in the same window: where a motion turns from rough to smooth, the few differences of a group that
+/// happen to be small would pass for smooth ones, and the band of the load would be too narrow there.
+std::vector<double> as_wide_as_neighbours(const std::vector<double>& precision, const std::vector<Index>& window) {
+  std::vector<double> widest = precision;
+  for (std::size_t g = 1; g < precision.size(); ++g) {
+    if (window[g] != window[g - 1]) continue;
+    widest[g] = std::min(widest[g], precision[g - 1]);
+    widest[g - 1] = std::min(widest[g - 1], precision[g]);
+  }
+  return widest;
+}
+
 }  // namespace
 
 MatrixXd motion_prior(const RunResidual& residual, const VectorXd& theta) {
@@ -34,13 +46,14 @@ MatrixXd motion_prior(const RunResidual& residual, const VectorXd& theta) {
   if (motion.unknowns() == 0) return {};
   const Index unknowns = residual.linear_unknowns();
   std::vector<MatrixXd> groups;
+  std::vector<Index> of_window;
   for (const MotionBasis::Window& window : motion.windows()) {
     const MatrixXd d = differences(motion, window);
     const Index size = group_size * window.stride;
     for (Index first = 0; first < d.rows(); first += size) {
       MatrixXd group = MatrixXd::Zero(std::min(size, d.rows() - first), unknowns);
       group.leftCols(motion.unknowns()) = d.middleRows(first, group.rows());
-      if (group.norm() > 0) groups.push_back(std::move(group));
+      if (group.norm() > 0) groups.push_back(std::move(group)), of_window.push_back(window.knots.first);
     }
   }
 
@@ -72,6 +85,8 @@ MatrixXd motion_prior(const RunResidual& residual, const VectorXd& theta) {
     }
     if (change < 0.02) break;
   }
+
+  precision = as_wide_as_neighbours(precision, of_window);
 
   Index rows = 0;
   for (const MatrixXd& group : groups) rows += group.rows();
