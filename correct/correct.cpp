@@ -2,9 +2,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 
 #include <fmt/format.h>
 
+#include "core/effects/effect.h"
 #include "core/indicial_table.h"
 #include "core/rigid_load.h"
 #include "correct/prior.h"
@@ -35,6 +37,13 @@ void check(const CorrectProblem& problem) {
     throw InputError({run.file, 0}, fmt::format("a response that starts at {:g} and never falls", *problem.imposed.at_step), "wanted a start of at most 1, which is its limit", "");
 }
 
+/// The effects of the fit, but those that are part of the load: the free build-up of circulation stands in their place.
+std::vector<std::string> effects_of_the_rig(const FittedRig& fit) {
+  std::vector<std::string> ids;
+  std::copy_if(fit.effects.begin(), fit.effects.end(), std::back_inserter(ids), [](const std::string& id) { return !effect(id).in_the_load; });
+  return ids;
+}
+
 /// The coupled model with a free build-up of circulation.
 AeroelasticModel free_model(const CorrectProblem& problem, double semichords) {
   const Run& run = problem.run;
@@ -42,7 +51,7 @@ AeroelasticModel free_model(const CorrectProblem& problem, double semichords) {
   const Basis basis = problem.fit.normal_modes > 0 ? make_basis(problem.rig, problem.fit.normal_modes, problem.fit.torsion_modes)
                                                    : make_basis(problem.rig, 0.5 / run.dt, run.density);
   const AeroelasticModel model =
-      AeroelasticModel(problem.rig, basis, {"free", wagner_amplitudes(rates, semichords), rates}, AeroelasticModel::Circulation::free).with_effects(problem.fit.effects);
+      AeroelasticModel(problem.rig, basis, {"free", wagner_amplitudes(rates, semichords), rates}, AeroelasticModel::Circulation::free).with_effects(effects_of_the_rig(problem.fit));
   for (const Parameter& p : model.parameters())
     if (!p.per_run && !problem.fit.find(p.name, run.file))
       throw InputError({problem.fit.file, 0}, "no parameter \"" + p.name + "\"", "wanted a fit of the rig " + problem.rig.file, "Fit this rig to its free decays and steps first.");

@@ -58,6 +58,8 @@ struct CorrectResult {
 /// gauge and angle. Each amplitude has a normal prior around zero whose standard deviation maximises the evidence (correct/prior.h); it decides what the
 /// record leaves open. The answers at half and at twice its weight, 1/tau^2, are part of the result.
 ///
+/// Effects of the fit are honoured, but those that are part of the load (`wagner-lag`, `separation-lag`): they belong into the answer, and the free response takes their place.
+///
 /// What the user wants imposed on the response holds exactly in the answer. The standard deviations under an imposed phi(0) take it for exact; under imposed monotonicity they are
 /// those without it: the constrained estimate is the point nearest to the free one in the metric of its information within a convex set that holds the
 /// truth, and no further from it there, so that they are upper estimates.

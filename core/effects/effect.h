@@ -48,6 +48,7 @@ struct Effect {
   /// Whether it can act at all under these conditions.
   bool (*acts)(const Conditions& conditions) = nullptr;
   void (*apply)(LinearSystem& system, const EffectContext& context) = nullptr;
+  bool in_the_load = false;   ///< it changes the load that a rigid rig would feel, which `correct` must not take out
   bool on_modal_rigs = true;  ///< whether it makes sense for a rig that is known only as modes
 };
 

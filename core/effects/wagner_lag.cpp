@@ -14,6 +14,7 @@ Effect wagner_lag() {
   e.parameters = {{"rate", "1", 1, 0.05, 20, false}, {"amplitude", "1", 1, 0, 1.9, false}};
   e.starts = {Eigen::Vector2d(1, 1), Eigen::Vector2d(0.4, 1), Eigen::Vector2d(2.5, 1)};
   e.acts = [](const Conditions& c) { return c.speed > 0; };
+  e.in_the_load = true;
   e.on_modal_rigs = false;
   e.apply = [](LinearSystem& system, const EffectContext& c) {
     const Eigen::Index n = system.states(), first = 2 * system.coordinates, terms = c.model.circulation().rate.size(), parameters = c.theta.size();

@@ -98,6 +98,21 @@ TEST(Correct, LoadIsCirculatoryPlusInertiaAndStartsSteady) {
   EXPECT_GT((result.normal_force.value - result.circulatory.value).cwiseAbs().maxCoeff(), 50) << "the ramp itself is apparent mass";
 }
 
+TEST(Correct, LeavesWhatBelongsToTheLoadInIt) {
+  // A fit that found a loss of lift: the loss is load, so that the answer is the same as without.
+  CorrectProblem problem = null_problem("step_c");
+  const CorrectResult plain = correct(problem);
+  problem.fit.effects = {"separation-lag", "wagner-lag"};
+  for (const auto& [name, value] : {std::pair{"separation-lag.loss", 0.3}, std::pair{"separation-lag.time", 10.0}, std::pair{"wagner-lag.rate", 2.0}, std::pair{"wagner-lag.amplitude", 0.5}}) {
+    problem.fit.parameters.emplace_back();
+    problem.fit.parameters.back().name = name;
+    problem.fit.parameters.back().value = value;
+  }
+  const CorrectResult with = correct(problem);
+  EXPECT_LT((with.circulatory.value - plain.circulatory.value).cwiseAbs().maxCoeff(), 1e-9);
+  EXPECT_LT((with.circulatory.std - plain.circulatory.std).cwiseAbs().maxCoeff(), 1e-9);
+}
+
 // ---------------------------------------------------------------------------------------------------------------- no answer
 
 std::string refusal(const CorrectProblem& problem) {
