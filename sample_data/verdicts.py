@@ -12,7 +12,7 @@ import subprocess
 import sys
 import tempfile
 
-LIMIT = 120  # seconds a campaign
+LIMIT = 600  # seconds a campaign
 
 
 def diagnose(unrig, folder):
@@ -33,6 +33,8 @@ def row(name, d):
     found = ", ".join(f"{m['effect']} ({m['probability']:.3f})" for m in d["missing"]) or ("unexplained" if d["unexplained"] else "nothing missing")
     if d["missing"] and d["unexplained"]:
         found += "; something remains"
+    if d["equivalent"]:
+        found += "; cannot be told from " + ", ".join(" + ".join(other) for other in d["equivalent"])
     parameters = "; ".join(
         f"{p['name'].split('.', 1)[1]} {p['value']:.5g}" + (f" ± {p['std_error']:.2g}" if p["std_error"] is not None else "") + f" {p['unit']}"
         for m in d["missing"] for p in m["parameters"] if "run" not in p)
