@@ -130,19 +130,6 @@ void give_probabilities(std::vector<Candidate>& ranking) {
   for (Candidate& c : ranking) c.probability /= sum;
 }
 
-/// What a user would get who knows of nothing missing. Where something is, the fit is searched no nearer than its systematic errors deserve.
-FitResult describe_baseline(Arrival arrival, const FitProblem& problem, bool something_missing) {
-  if (!something_missing) return describe_fit(arrival, problem);
-  for (RunResidual& run : arrival.joint.runs()) run.temper(1);
-  JointProblem::SolveOptions options;
-  options.iterations = 10;
-  options.tolerance = 1e-3;
-  options.precision = 0.5;
-  options.most_evaluations = 15;
-  solve(arrival, options);
-  return describe_fit(arrival, problem, true);
-}
-
 /// What runs that were not fitted are left with, before and after.
 std::vector<ImprovedRun> predict_unseen(const DiagnoseProblem& problem, const FitProblem& fit_problem, const Arrival& baseline, const Trial& best) {
   FitProblem after = fit_problem;
@@ -168,8 +155,8 @@ double power_over_noise(const std::vector<ImprovedRun>& runs, double ImprovedRun
 void describe(const DiagnoseProblem& problem, const FitProblem& fit_problem, const Trial& baseline, const Trial& best, Diagnosis& d) {
   FitProblem after = fit_problem;
   after.effects = best.effects;
-  Arrival after_arrival = best.arrival;
-  d.before = describe_baseline(baseline.arrival, fit_problem, d.mismatch.found);
+  Arrival before_arrival = baseline.arrival, after_arrival = best.arrival;
+  d.before = describe_fit(before_arrival, fit_problem, d.mismatch.found);  // a fit that explains nothing deserves no refinement
   d.after = best.effects.empty() ? d.before : describe_fit(after_arrival, after);
   d.bic_after = bic_difference(best, baseline) + (d.bic_before = d.before.bic());
   for (std::size_t r = 0; r < problem.runs.size(); ++r) {
