@@ -173,7 +173,8 @@ void RunResidual::solve_nonlinear(Linearised& lin, const VectorXd& theta) const 
 
 /// Gauss-Newton steps in c, halved where chi-square does not fall.
 void RunResidual::search_along_tangents(Linearised& lin, const VectorXd& theta, NonlinearPoint point) const {
-  constexpr int most = 8;  // exact tangents either arrive in a few steps, or the law has kinks and the next search in theta comes by again
+  // From where the equivalent linear system led, exact tangents arrive in a few steps, or the law has kinks and the next search in theta comes by again.
+  const int most = motion_.unknowns() > 0 ? 8 : 30;
   for (int i = 0; i < most; ++i) {
     if (!stack_nonlinear_rows(lin, theta, point.linear)) {
       lin.chi2 = INFINITY;

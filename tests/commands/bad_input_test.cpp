@@ -215,7 +215,7 @@ TEST_F(BadInput, ARunThatDoesNotBelongToTheRig) {
   expect_refused_decay(replaced(decay(), "gauge [N]", "gauge [N.m]"), {"decay.csv:7: ", "gauge", "N.m", "rig.toml"});
   const std::string modes = directory_.file("modes.toml", "unrig_rig = 1\n[[modal]]\nmass = \"1 kg\"\nfrequency = \"3 Hz\"\ndamping_ratio = 0.01\ngauge_gain = \"1 N/m\"\n");
   refused({"fit", "--rig", modes, step_}, {"step.csv:7: ", "step", "modes.toml"});
-  refused({"correct", "--rig", modes, "--fit", fit_, step_}, {"modes.toml", "only as modes"});
+  refused({"correct", "--rig", modes, "--fit", fit_, step_}, {"fit.json", "modal[1].mass", "modes.toml"});
   refused({"correct", "--rig", rig_, "--fit", fit_, decay_}, {"decay.csv", "speed 0"});
   refused({"correct", "--rig", rig_, "--fit", fit_, step_}, {"fit.json", "normal.stiffness_scale"});
   refused({"apparent-mass", "--rig", rig_, "--dry", dry_, "--wet", step_}, {"step.csv"});
