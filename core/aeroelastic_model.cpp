@@ -158,8 +158,6 @@ void keep_inputs(LinearSystem& system, const Conditions& conditions) {
   for (Feedback& f : system.feedback) f.sees.conservativeResizeLike(RowVectorXd::Zero(system.states()));  // states that came later
 }
 
-double sensor_gain(const Sensor& sensor) { return sensor.gain; }
-
 /// A run must have what its kind says drives the rig, and the rig must be able to answer to it.
 void check_kind(const Run& run, const Rig& rig) {
   const auto refuse = [&](const std::string& found, const std::string& wanted) { throw InputError({run.file, run.header_line}, found, wanted, ""); };
@@ -428,7 +426,7 @@ LinearSystem AeroelasticModel::beam_system(const Conditions& conditions, const V
     }
     for (const Sensor& sensor : rig_.sensors) {
       if (sensor.column != channels[c]) continue;
-      const MatrixXd h = sensor_gain(sensor) * k.normal.row(sensor.element - 1), twist = sensor_gain(sensor) * k.twist.row(sensor.element - 1);
+      const MatrixXd h = sensor.gain * k.normal.row(sensor.element - 1), twist = sensor.gain * k.twist.row(sensor.element - 1);
       switch (sensor.reads) {
         case SensorKind::displacement: outputs.value.row(row) += force.displacement(h); break;
         case SensorKind::velocity: outputs.value.row(row) += force.rate(h); break;
