@@ -5,8 +5,8 @@
 
 #include "core/command.h"
 #include "core/in_parallel.h"
-#include "core/effects/effect.h"
 #include "core/text_file.h"
+#include "fit/effect_option.h"
 #include "fit/fit.h"
 #include "fit/fit_files.h"
 
@@ -43,11 +43,7 @@ int fit_command(int argc, char** argv) {
     throw InputError({"--wagner", 0}, e.what(), "wanted one of the names above", "");
   }
   for (const std::string& path : run_paths) problem.runs.push_back(read_run(path));
-  try {
-    for (const std::string& id : effect_ids) problem.effects.push_back(effect(id).id);
-  } catch (const std::invalid_argument& e) {
-    throw InputError({"--effect", 0}, e.what(), "wanted one of these", "");
-  }
+  problem.effects = effects_of_option("--effect", effect_ids);
   for (const std::string& start : starts) {
     const std::size_t equals = start.find('=');
     const char* text = start.c_str() + (equals == std::string::npos ? 0 : equals + 1);

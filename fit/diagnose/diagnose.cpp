@@ -199,7 +199,7 @@ Diagnosis diagnose(const DiagnoseProblem& problem) {
   const Trial baseline = fit_baseline(fit_problem);
   Diagnosis d;
   d.mismatch = locate_mismatch(baseline.arrival.joint);
-  d.maps = residual_maps(baseline.arrival.joint, d.mismatch.runs);
+  if (!problem.verdict_only) d.maps = residual_maps(baseline.arrival.joint, d.mismatch.runs);
   d.ranking.push_back({{}, baseline.reduced_chi2(), 0, 0, 0});
 
   Trial best = baseline;

@@ -20,7 +20,7 @@ struct DiagnoseProblem {
   std::vector<Run> runs;
   std::vector<Run> heldout;           ///< not fitted; predicted, with their own motion, initial state and lift slope
   Wagner circulation = Wagner::within_1e4;
-  bool verdict_only = false;          ///< neither predictions, nor descriptions of the fits, nor the missing force
+  bool verdict_only = false;          ///< neither maps nor predictions, nor descriptions of the fits, nor the missing force
   std::vector<std::string> effects;   ///< candidates; empty: all that can act in these runs
   std::function<void(const std::string&)> progress;
 };

@@ -4,11 +4,11 @@
 #include <fmt/format.h>
 
 #include "core/command.h"
-#include "core/effects/effect.h"
 #include "core/in_parallel.h"
 #include "core/text_file.h"
 #include "fit/diagnose/diagnose.h"
 #include "fit/diagnose/diagnosis_files.h"
+#include "fit/effect_option.h"
 #include "fit/fit_files.h"
 
 namespace unrig {
@@ -34,11 +34,7 @@ int diagnose_command(int argc, char** argv) {
   problem.rig = read_rig(rig);
   for (const std::string& path : runs) problem.runs.push_back(read_run(path));
   for (const std::string& path : heldout) problem.heldout.push_back(read_run(path));
-  try {
-    for (const std::string& id : ids) problem.effects.push_back(effect(id).id);
-  } catch (const std::invalid_argument& e) {
-    throw InputError({"--effects", 0}, e.what(), "wanted some of these", "");
-  }
+  problem.effects = effects_of_option("--effects", ids);
   Progress progress;
   problem.progress = [&](const std::string& what) { progress(what); };
   const Diagnosis diagnosis = diagnose(problem);

@@ -9,6 +9,7 @@
 #include <nlohmann/json.hpp>
 
 #include "core/effects/effect.h"
+#include "core/error.h"
 #include "core/in_parallel.h"
 #include "fit/diagnose/diagnose.h"
 #include "fit/diagnose/trial_campaign.h"
@@ -117,6 +118,8 @@ TrialResult run_trials(const TrialProblem& problem) {
   Strings ids = problem.effects;
   if (ids.empty())
     for (const Effect& e : effects()) ids.push_back(e.id);
+  if (const std::size_t at_a_time = problem.pairs ? 2 : 1; problem.outside && ids.size() <= at_a_time)
+    throw InputError({"--outside", 0}, fmt::format("{} to hide in turn, {} at a time", ids.size(), at_a_time), "wanted candidates beside what is hidden", "Name more of --effects.");
   TrialResult result;
   result.seed = problem.seed;
   result.noise = problem.noise;

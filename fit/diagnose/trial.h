@@ -54,7 +54,7 @@ struct TrialResult {
 /// Trial i hides nothing (i = 0 and every further round), or the next of `effects`, or it and another one; sizes and rigs are drawn anew from (seed, i), so
 /// that a trial depends on nothing but these two numbers.
 ///
-/// Throws InputError where the rig cannot be plucked and pitched (trial_campaign.h).
+/// Throws InputError where the rig cannot be plucked and pitched (trial_campaign.h), or where `outside` would leave no candidate.
 TrialResult run_trials(const TrialProblem& problem);
 
 /// "nothing", or the names with " + " between them, in alphabetical order.

@@ -4,12 +4,12 @@
 #include <fmt/format.h>
 
 #include "core/command.h"
-#include "core/effects/effect.h"
 #include "core/error.h"
 #include "core/in_parallel.h"
 #include "core/text_file.h"
 #include "core/units.h"
 #include "fit/diagnose/trial.h"
+#include "fit/effect_option.h"
 
 namespace unrig {
 
@@ -37,11 +37,7 @@ int trial_command(int argc, char** argv) {
   for (const std::string& warning : problem.rig.warnings) warn(warning);
   problem.noise = quantity(noise, "N", {"--noise", 0}, "the noise");
   if (!(problem.noise > 0)) throw InputError({"--noise", 0}, "noise of " + noise, "wanted more than none", "");
-  try {
-    for (const std::string& id : ids) problem.effects.push_back(effect(id).id);
-  } catch (const std::invalid_argument& e) {
-    throw InputError({"--effects", 0}, e.what(), "wanted some of these", "");
-  }
+  problem.effects = effects_of_option("--effects", ids);
   Progress progress;
   problem.progress = [&](const std::string& what) { progress(what); };
   const TrialResult result = run_trials(problem);

@@ -53,6 +53,21 @@ TEST(Trial, NothingHiddenAndAWave) {
   EXPECT_THAT(report(result), HasSubstr("0 false alarms in 1 campaigns"));
 }
 
+TEST(Trial, WhatIsHiddenOutsideTheCandidatesCannotBeNamed) {
+  TrialProblem problem;
+  problem.rig = read_rig(test::null_campaign("rig.toml"));
+  problem.effects = {"tank-wave", "gauge-drift"};
+  problem.trials = 2;
+  problem.outside = true;
+  const TrialResult result = run_trials(problem);
+  ASSERT_EQ(result.outcomes[1].hidden, std::vector<std::string>{"tank-wave"});
+  ASSERT_GT(result.outcomes[1].size, 2) << "this seed draws a wave that is far above the noise";
+  EXPECT_THAT(result.outcomes[1].found, IsEmpty());
+  EXPECT_TRUE(result.outcomes[1].unexplained);
+  problem.effects = {"tank-wave"};  // no candidate would be left, and none named means all
+  EXPECT_THROW(run_trials(problem), InputError);
+}
+
 TEST(Trial, RefusesARigThatCannotBePitched) {
   TrialProblem problem;
   problem.rig.modal = {{2, 3, 0.01, 1000, "N"}};

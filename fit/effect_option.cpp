@@ -1,0 +1,18 @@
+#include "fit/effect_option.h"
+
+#include <stdexcept>
+
+#include "core/effects/effect.h"
+#include "core/error.h"
+
+namespace unrig {
+
+std::vector<std::string> effects_of_option(const std::string& option, const std::vector<std::string>& ids) try {
+  std::vector<std::string> known;
+  for (const std::string& id : ids) known.push_back(effect(id).id);
+  return known;
+} catch (const std::invalid_argument& e) {
+  throw InputError({option, 0}, e.what(), "wanted one of these", "");
+}
+
+}  // namespace unrig

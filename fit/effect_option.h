@@ -1,0 +1,10 @@
+#pragma once
+#include <string>
+#include <vector>
+
+namespace unrig {
+
+/// The effects that a command's `option` names, as it names them. Throws InputError naming the option and the choices for one that does not exist.
+std::vector<std::string> effects_of_option(const std::string& option, const std::vector<std::string>& ids);
+
+}  // namespace unrig
