@@ -95,7 +95,10 @@ double least_between(double low, double high, Function f) {
   double a = best - step, b = best + step;
   for (int i = 0; i < sections; ++i) {
     const double c = b - golden * (b - a), d = a + golden * (b - a);
-    (f(c) < f(d) ? b : a) = f(c) < f(d) ? d : c;
+    if (f(c) < f(d))
+      b = d;
+    else
+      a = c;
   }
   return 0.5 * (a + b);
 }

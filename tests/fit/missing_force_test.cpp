@@ -68,7 +68,7 @@ TEST(MissingForce, FindsPushesAtTheirTime) {
   VectorXd truth(samples);
   for (Index k = 0; k < samples; ++k) truth[k] = push(dt * static_cast<double>(k));
   EXPECT_GT((residual.array().isFinite().select(residual, 0.0) - truth).norm() / truth.norm(), 1) << "the reading itself is no answer";
-  EXPECT_LT((found.value - truth).norm() / std::sqrt(static_cast<double>(samples)), 1.5 * found.standard_deviation) << "a push is no random walk, but its band is about right";
+  EXPECT_LT((found.value - truth).norm() / std::sqrt(static_cast<double>(samples)), found.standard_deviation) << "most of the time there is no push, and then less is wrong than the band allows for";
   Index peak = 0;
   found.value.head(800).maxCoeff(&peak);
   EXPECT_NEAR(dt * static_cast<double>(peak), 0.95, 0.02) << "the crest is flat: within 0.02 s the push is 4 % of itself below it";
@@ -96,15 +96,16 @@ TEST(MissingForce, BandHolds) {
       ++count;
     }
   }
-  EXPECT_NEAR(inside / count, 0.95, 0.03);
-  EXPECT_NEAR(estimated, roughness, 0.15 * roughness);
+  EXPECT_NEAR(inside / count, 0.95, 0.03) << "three times that scatter";
+  EXPECT_NEAR(estimated, roughness, 0.1 * roughness) << "five hundred stretches tell a variance to 6 %, its root to 3 %: three times that";
 }
 
 /// White noise holds no force: what is found is far below what the rig would need to read the noise.
 TEST(MissingForce, NothingWhereThereIsNothing) {
   constexpr double noise = 0.05;
   const MissingForce found = estimate_force(oscillator(), dt, white(3000, noise, 9), noise);
-  EXPECT_LT(found.value.norm() / std::sqrt(3000.0), 0.1 * noise);
+  EXPECT_LT(found.value.norm() / std::sqrt(3000.0), 3 * found.standard_deviation);
+  EXPECT_LT(found.standard_deviation, 0.1 * noise) << "a mean over a hundredth of the record would know it as well";
 }
 
 }  // namespace
