@@ -105,7 +105,7 @@ TEST(MissingForce, NothingWhereThereIsNothing) {
   constexpr double noise = 0.05;
   const MissingForce found = estimate_force(oscillator(), dt, white(3000, noise, 9), noise);
   EXPECT_LT(found.value.norm() / std::sqrt(3000.0), 3 * found.standard_deviation);
-  EXPECT_LT(found.standard_deviation, 0.1 * noise) << "a mean over a hundredth of the record would know it as well";
+  EXPECT_LT(found.standard_deviation, 0.1 * noise) << "as well as the mean of a hundred of the three thousand samples";
 }
 
 }  // namespace
