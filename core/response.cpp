@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 
 namespace unrig {
 namespace {
@@ -10,7 +11,7 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-constexpr Index block_length = 32;
+constexpr Index block_length = FreeResponse::block_length;
 
 bool acts(const LinearSystem& system, Index parameter) {
   return system.A.depends_on(parameter) || system.B.depends_on(parameter) || system.C.depends_on(parameter) || system.D.depends_on(parameter);
@@ -41,6 +42,15 @@ DualMatrix observation_block(const DualMatrix& C, const DualMatrix& transition) 
   return block;
 }
 
+/// What has died out becomes zero: numbers below the smallest normal one are a hundred times slower to reckon with.
+DualMatrix without_dust(DualMatrix state) {
+  constexpr double dust = 1e-250;
+  const auto settled = [](double x) { return std::abs(x) < dust ? 0.0 : x; };
+  state.value = state.value.unaryExpr(settled);
+  for (MatrixXd& p : state.partial) p = p.unaryExpr(settled);
+  return state;
+}
+
 DualMatrix to_the_block_length(DualMatrix transition) {
   for (Index power = 1; power < block_length; power *= 2) transition = transition * transition;
   return transition;
@@ -48,44 +58,55 @@ DualMatrix to_the_block_length(DualMatrix transition) {
 
 }  // namespace
 
-Response coast(const LinearSystem& system, const ExactStep& step, const DualMatrix& start, Index samples, Partials partials) {
+FreeResponse::FreeResponse(const LinearSystem& system, const ExactStep& step, Partials partials) : channels_(system.C.rows()) {
+  const bool with_partials = partials == Partials::all;
+  transition_ = with_partials ? step.transition : without_partials(step.transition);
+  observe_ = observation_block(with_partials ? system.C : without_partials(system.C), transition_);
+  leap_ = to_the_block_length(transition_);
+  if (with_partials)
+    for (Index j = 0; j < system.A.parameters(); ++j) acts_.push_back(acts(system, j));
+}
+
+DualMatrix FreeResponse::block(Index channel) const { return observe_.block(channel * block_length, 0, block_length, observe_.cols()); }
+
+Response FreeResponse::empty(Index samples) const {
+  Response r;
+  r.output = MatrixXd::Zero(samples, channels_);
+  r.partial.resize(acts_.size());
+  for (std::size_t j = 0; j < acts_.size(); ++j)
+    if (acts_[j]) r.partial[j] = MatrixXd::Zero(samples, channels_);
+  return r;
+}
+
+Response FreeResponse::from(const DualMatrix& start, Index samples) const {
+  Response response = empty(samples);
   const bool at_rest = start.value.isZero(0) && std::all_of(start.partial.begin(), start.partial.end(), [](const MatrixXd& p) { return p.isZero(0); });
   if (at_rest) {
-    Response rest = make_response(samples, system, partials);
-    rest.output.setZero();
-    for (MatrixXd& p : rest.partial) p.setZero();
-    rest.end = start;
-    return rest;
+    response.end = start;
+    return response;
   }
-  const bool with_partials = partials == Partials::all;
-  const DualMatrix transition = with_partials ? step.transition : without_partials(step.transition);
-  const DualMatrix observe = observation_block(with_partials ? system.C : without_partials(system.C), transition);
-  const DualMatrix leap = to_the_block_length(transition);
-  const Index channels = system.C.rows();
-  Response response = make_response(samples, system, partials);
-  DualMatrix state = with_partials ? start : without_partials(start);
+  DualMatrix state = acts_.empty() ? without_partials(start) : start;
   for (Index first = 0; first < samples; first += block_length) {
     const Index count = std::min(block_length, samples - first);
-    const DualMatrix outputs = observe * state;
-    for (Index c = 0; c < channels; ++c) {
+    const DualMatrix outputs = observe_ * state;
+    for (Index c = 0; c < channels_; ++c) {
       response.output.col(c).segment(first, count) = outputs.value.col(0).segment(c * block_length, count);
-      for (std::size_t j = 0; j < response.partial.size(); ++j) {
-        if (response.partial[j].size() == 0) continue;
-        auto target = response.partial[j].col(c).segment(first, count);
-        if (outputs.depends_on(static_cast<Index>(j)))
-          target = outputs.d(static_cast<Index>(j)).col(0).segment(c * block_length, count);
-        else
-          target.setZero();
-      }
+      for (std::size_t j = 0; j < response.partial.size(); ++j)
+        if (response.partial[j].size() > 0 && outputs.depends_on(static_cast<Index>(j)))
+          response.partial[j].col(c).segment(first, count) = outputs.d(static_cast<Index>(j)).col(0).segment(c * block_length, count);
     }
     if (count == block_length) {
-      state = leap * state;
+      state = without_dust(leap_ * state);
     } else {
-      for (Index k = 0; k < count; ++k) state = transition * state;
+      for (Index k = 0; k < count; ++k) state = transition_ * state;
     }
   }
   response.end = state;
   return response;
+}
+
+Response coast(const LinearSystem& system, const ExactStep& step, const DualMatrix& start, Index samples, Partials partials) {
+  return FreeResponse(system, step, partials).from(start, samples);
 }
 
 Response drive(const LinearSystem& system, const ExactStep& step, const DualMatrix& start, Index samples, const VectorXd& jerk, const MatrixXd& input,

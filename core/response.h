@@ -16,8 +16,29 @@ struct Response {
 /// Which partials to carry along: all of the system's, or none (a third of the cost).
 enum class Partials { none, all };
 
-/// Free response from `start` over `samples` samples: no jerk, no inputs. Cost per sample 2 n K (1 + 2 P) for n states, K channels, P parameters:
+/// The free response of one system from any start: no jerk, no inputs. Cost per sample 2 n (K + n/32) (1 + 2 P) for n states, K channels, P parameters:
 /// outputs come in blocks from the state at the block's first sample.
+class FreeResponse {
+ public:
+  static constexpr Eigen::Index block_length = 32;
+
+  FreeResponse(const LinearSystem& system, const ExactStep& step, Partials partials);
+  Response from(const DualMatrix& start, Eigen::Index samples) const;
+
+  Eigen::Index channels() const { return channels_; }
+  DualMatrix block(Eigen::Index channel) const;           ///< rows C transition^k of a block: block_length x n
+  const DualMatrix& leap() const { return leap_; }        ///< transition^block_length
+
+ private:
+  Response empty(Eigen::Index samples) const;
+
+  DualMatrix transition_, leap_;
+  DualMatrix observe_;  ///< the channels' blocks in turn
+  std::vector<bool> acts_;
+  Eigen::Index channels_;
+};
+
+/// One such response.
 Response coast(const LinearSystem& system, const ExactStep& step, const DualMatrix& start, Eigen::Index samples, Partials partials);
 
 /// Driven response: `jerk` one value per sample (empty: none), `input` samples + 1 rows of inputs (empty: none). Exact for cubic-spline

@@ -4,7 +4,9 @@
 #include <numbers>
 #include <numeric>
 #include <stdexcept>
+#include <tuple>
 #include <utility>
+#include <vector>
 
 #include "core/exact_step.h"
 #include "core/response.h"
@@ -35,55 +37,124 @@ LinearSystem lag_system(const VectorXd& rate, double U, double b, const RowVecto
   return s;
 }
 
-/// How the state moves with the motion's unknowns at `sample`, from the state after one spline and the running sum of it: states x unknowns.
-MatrixXd state_by_motion(const MotionBasis& motion, const MatrixXd& unit, const MatrixXd& summed, Index sample) {
-  MatrixXd columns = MatrixXd::Zero(unit.rows(), motion.unknowns());
-  for (Index j = 0; j < motion.unknowns(); ++j) {
-    const MotionBasis::Column& column = motion.columns()[static_cast<std::size_t>(j)];
-    const Index since = sample - column.first;
-    if (since <= 0) break;  // columns begin later and later
-    for (Index i = 0; i < std::min(since, column.value.size()); ++i) columns.col(j) += column.value[i] * unit.col(since - i);
-    if (const Index after = since - column.value.size(); column.tail != 0 && after > 0) columns.col(j) += column.tail * summed.col(after);
+/// The record in turn: intervals in which the shaft moves, and the rests between.
+struct Phase {
+  Interval samples;
+  bool moving;
+};
+
+std::vector<Phase> phases_of(const MotionBasis& motion) {
+  std::vector<Phase> phases;
+  Index at = 0;
+  for (const Interval& active : motion.active()) {
+    if (active.first > at) phases.push_back({{at, active.first}, false});
+    if (active.first < at)  // the last splines of one window still act when the next begins
+      phases.back().samples.last = active.last;
+    else
+      phases.push_back({active, true});
+    at = active.last;
   }
-  return columns;
+  if (at < motion.samples()) phases.push_back({{at, motion.samples()}, false});
+  return phases;
 }
 
-/// State, and how it moves with the motion's unknowns, at ascending samples. Behind `moving` samples it only decays.
-class StateAt {
+/// State of the lags and the motion over the record, and how it moves with the motion's unknowns.
+class Lags {
  public:
-  StateAt(const LinearSystem& system, const ExactStep& step, const MotionBasis& motion, const VectorXd& jerk, Index moving)
-      : system_(system), motion_(motion), dt_(step.dt), unit_(spline_states(step, moving + 1)), summed_(unit_), at_(moving) {
-    for (Index k = 1; k <= moving; ++k) summed_.col(k) += summed_.col(k - 1);
-    const Response response = drive(system, step, DualMatrix(MatrixXd::Zero(system.states(), 1)), moving, jerk, {}, Partials::none);
-    states_ = response.output;
-    state = response.end.value.col(0);
-    by_motion = state_by_motion(motion, unit_, summed_, moving);
-    state.tail(2).setZero();  // rate and acceleration of a shaft at rest, up to rounding
-    by_motion.bottomRows(2).setZero();
-    resting_ = {state, by_motion};
+  Lags(const LinearSystem& system, const ExactStep& step, const MotionBasis& motion, const VectorXd& unknowns)
+      : system_(system), step_(step), motion_(motion), moves_(motion_of(motion.coefficients(unknowns), step.dt)), phases_(phases_of(motion)) {
+    Index longest = 0;
+    for (const Phase& phase : phases_)
+      if (phase.moving) longest = std::max(longest, phase.samples.length());
+    unit_ = spline_states(step, longest + 1);
+    summed_ = unit_;
+    for (Index k = 1; k < summed_.cols(); ++k) summed_.col(k) += summed_.col(k - 1);
   }
-  void move_to(Index sample) {
-    if (sample < states_.rows()) {
-      state = states_.row(sample).transpose();
-      by_motion = state_by_motion(motion_, unit_, summed_, sample);
-      return;
+
+  /// Quantities that are `rows` times the state, at every sample.
+  MatrixXd follow(const MatrixXd& rows) const {
+    LinearSystem system = system_;
+    system.C = DualMatrix(rows);
+    const FreeResponse free(system, step_, Partials::none);
+    MatrixXd all(motion_.samples(), rows.rows());
+    DualMatrix state(MatrixXd::Zero(system.states(), 1));
+    for (const Phase& phase : phases_) {
+      const Interval& s = phase.samples;
+      const Response response = phase.moving ? drive(system, step_, state, s.length(), moves_.jerk.segment(s.first, s.length()), {}, Partials::none) : free.from(state, s.length());
+      state = response.end;
+      if (phase.moving && s.last < motion_.samples()) stand_still(state.value, moves_.angle.segment(s.last, 1));
+      all.middleRows(s.first, s.length()) = response.output;
     }
-    const MatrixXd leap = exact_step(system_, dt_ * static_cast<double>(sample - at_)).transition.value;
-    at_ = sample;
-    resting_ = {leap * resting_.first, leap * resting_.second};
-    state = resting_.first;
-    by_motion = resting_.second;
+    return all;
   }
-  VectorXd state;
-  MatrixXd by_motion;
+
+  /// Hands `take` the state and its slope, states x unknowns, at these ascending samples, with the place of each among them.
+  template <class Take>
+  void at(const std::vector<Index>& samples, Take take) const {
+    const Index n = system_.states();
+    VectorXd state = VectorXd::Zero(n);
+    MatrixXd slope = MatrixXd::Zero(n, motion_.unknowns());
+    std::size_t next = 0;
+    for (const Phase& phase : phases_) {
+      const Interval& s = phase.samples;
+      MatrixXd states;  // samples x n
+      if (phase.moving) {
+        LinearSystem whole = system_;
+        whole.C = DualMatrix(MatrixXd::Identity(n, n));
+        states = drive(whole, step_, DualMatrix(MatrixXd(state)), s.length() + 1, with_one_more(moves_.jerk, s), {}, Partials::none).output;
+      }
+      const auto behind = [&](Index sample) -> std::pair<VectorXd, MatrixXd> {
+        const MatrixXd leap = exact_step(system_, step_.dt * static_cast<double>(sample - s.first)).transition.value;
+        if (!phase.moving) return {leap * state, leap * slope};
+        return {states.row(sample - s.first).transpose(), leap * slope + own_splines(s, sample)};
+      };
+      for (; next < samples.size() && samples[next] < s.last; ++next) {
+        const auto [there, its_slope] = behind(samples[next]);
+        take(static_cast<Index>(next), there, its_slope);
+      }
+      std::tie(state, slope) = behind(s.last);
+      if (!phase.moving || s.last >= motion_.samples()) continue;
+      MatrixXd column = state;
+      stand_still(column, moves_.angle.segment(s.last, 1));
+      state = column.col(0);
+      stand_still(slope, motion_.angle_columns({s.last, s.last + 1}));
+    }
+  }
 
  private:
+  /// A shaft that has come to rest stands exactly still: the rounding of its acceleration, eps/dt^3 of a spline, would turn it on with the square of the time.
+  static void stand_still(MatrixXd& state, const RowVectorXd& angle) {
+    state.row(state.rows() - 3) = angle;
+    state.bottomRows(2).setZero();
+  }
+
+  /// The jerk over these samples and, where the record goes on, the next.
+  static VectorXd with_one_more(const VectorXd& jerk, const Interval& s) {
+    VectorXd longer = VectorXd::Zero(s.length() + 1);
+    longer.head(s.length()) = jerk.segment(s.first, s.length());
+    return longer;
+  }
+
+  /// d state / d unknowns at `sample`, of the splines that begin in the interval.
+  MatrixXd own_splines(const Interval& interval, Index sample) const {
+    MatrixXd columns = MatrixXd::Zero(unit_.rows(), motion_.unknowns());
+    for (Index j = 0; j < motion_.unknowns(); ++j) {
+      const MotionBasis::Column& column = motion_.columns()[static_cast<std::size_t>(j)];
+      if (column.first < interval.first) continue;
+      const Index since = sample - column.first;
+      if (since <= 0) break;  // columns begin later and later
+      for (Index i = 0; i < std::min(since, column.value.size()); ++i) columns.col(j) += column.value[i] * unit_.col(since - i);
+      if (const Index after = since - column.value.size(); column.tail != 0 && after > 0) columns.col(j) += column.tail * summed_.col(after);
+    }
+    return columns;
+  }
+
   const LinearSystem& system_;
+  const ExactStep& step_;
   const MotionBasis& motion_;
-  double dt_;
-  MatrixXd unit_, summed_, states_;
-  std::pair<VectorXd, MatrixXd> resting_;
-  Index at_;
+  Motion moves_;
+  std::vector<Phase> phases_;
+  MatrixXd unit_, summed_;  // states after a unit spline, and their running sum
 };
 
 }  // namespace
@@ -94,7 +165,7 @@ RigidLoad rigid_load(const AeroelasticModel& model, const Conditions& conditions
   if (rig.is_modal()) throw std::invalid_argument("a modal rig has no section to load");
   const double b = rig.semichord(), U = conditions.speed, length = rig.strip_length * static_cast<double>(rig.submerged.size());
   const RowVectorXd downwash = (RowVectorXd(3) << U, (0.5 - rig.axis()) * b, 0).finished();
-  LinearSystem lags = lag_system(model.circulation().rate, U, b, downwash);
+  const LinearSystem lags = lag_system(model.circulation().rate, U, b, downwash);
   const ExactStep step = exact_step(lags, dt);
   const Index n = lags.states(), samples = motion.samples();
 
@@ -116,18 +187,11 @@ RigidLoad rigid_load(const AeroelasticModel& model, const Conditions& conditions
   MatrixXd loads(2, n);
   loads << slope * strength * built_up, slope * strength * built_up + ca * inertial + centrifugal;
 
-  Index moving = 0;
-  for (const Interval& active : motion.active()) moving = std::min(samples, active.last);
-  const VectorXd jerk = motion_of(motion.coefficients(u), dt).jerk;
-  const MatrixXd identity = lags.C.value;
-  lags.C = DualMatrix(loads);
-  const Response driven = drive(lags, step, DualMatrix(MatrixXd::Zero(n, 1)), moving, jerk, {}, Partials::none);
-  const Response resting = coast(lags, step, driven.end, samples - moving, Partials::none);
+  const Lags state(lags, step, motion, u);
+  const MatrixXd all = state.follow(loads);
   RigidLoad load;
-  load.circulatory.resize(samples);
-  load.circulatory << driven.output.col(0), resting.output.col(0);
-  load.normal_force.resize(samples);
-  load.normal_force << driven.output.col(1), resting.output.col(1);
+  load.circulatory = all.col(0);
+  load.normal_force = all.col(1);
 
   if (slopes_at.empty()) {
     slopes_at.resize(static_cast<std::size_t>(samples));
@@ -138,19 +202,16 @@ RigidLoad rigid_load(const AeroelasticModel& model, const Conditions& conditions
   load.normal_force_by_motion.resizeLike(load.circulatory_by_motion);
   load.circulatory_by_theta = MatrixXd::Zero(rows, theta.size());
   load.normal_force_by_theta = MatrixXd::Zero(rows, theta.size());
-  lags.C = DualMatrix(identity);
-  StateAt at(lags, step, motion, jerk, moving);
-  for (Index i = 0; i < rows; ++i) {
-    at.move_to(slopes_at[static_cast<std::size_t>(i)]);
-    load.circulatory_by_motion.row(i).noalias() = loads.row(0) * at.by_motion;
-    load.normal_force_by_motion.row(i).noalias() = loads.row(1) * at.by_motion;
-    const VectorXd still_missing = missing * at.state;
+  state.at(slopes_at, [&](Index i, const VectorXd& x, const MatrixXd& by_motion) {
+    load.circulatory_by_motion.row(i).noalias() = loads.row(0) * by_motion;
+    load.normal_force_by_motion.row(i).noalias() = loads.row(1) * by_motion;
+    const VectorXd still_missing = missing * x;
     for (Index k = 0; k < lags.lags; ++k)
       if (const Index parameter = model.circulation_parameter(k); parameter >= 0) load.circulatory_by_theta(i, parameter) = slope * strength * still_missing[k];
-    load.circulatory_by_theta(i, model.index("normal_force_slope")) = strength * built_up.dot(at.state);
+    load.circulatory_by_theta(i, model.index("normal_force_slope")) = strength * built_up.dot(x);
     load.normal_force_by_theta.row(i) = load.circulatory_by_theta.row(i);
-    load.normal_force_by_theta(i, model.index("apparent_mass_coefficient")) += inertial.dot(at.state);
-  }
+    load.normal_force_by_theta(i, model.index("apparent_mass_coefficient")) += inertial.dot(x);
+  });
   return load;
 }
 

@@ -35,12 +35,10 @@ MatrixXd inverse_root(const MatrixXd& rows) {
   return scale.asDiagonal() * MatrixXd(r.triangularView<Eigen::Upper>().solve(MatrixXd::Identity(r.rows(), r.cols())));
 }
 
-/// Information of the angle channel on c. A shaft that has come to rest adds one row with the weight of all.
+/// Information of the angle channel on c. While the shaft rests all rows are alike and are one row with their common weight.
 MatrixXd angle_information(const RunResidual& residual) {
   const Index unknowns = residual.linear_unknowns(), motion = residual.motion().unknowns(), samples = residual.angle_weight().size();
   constexpr Index block = 2048;
-  Index resting = 0;
-  for (const Interval& active : residual.motion().active()) resting = std::min(samples, active.last);
   MatrixXd information = MatrixXd::Zero(unknowns, unknowns);
   const auto add = [&](const Interval& range, const VectorXd& weight) {
     MatrixXd rows = MatrixXd::Zero(range.length(), unknowns);
@@ -49,11 +47,19 @@ MatrixXd angle_information(const RunResidual& residual) {
     rows = weight.asDiagonal() * rows;
     information.selfadjointView<Eigen::Lower>().rankUpdate(rows.transpose());
   };
-  for (Index first = 0; first < resting; first += block) {
-    const Interval range{first, std::min(resting, first + block)};
-    add(range, residual.angle_weight().segment(range.first, range.length()));
+  Index at = 0;
+  const auto rest_until = [&](Index end) {
+    if (at < end) add({at, at + 1}, VectorXd::Constant(1, residual.angle_weight().segment(at, end - at).norm()));
+    at = std::max(at, end);
+  };
+  for (const Interval& active : residual.motion().active()) {
+    rest_until(active.first);
+    for (const Index last = std::min(samples, active.last); at < last; at = std::min(last, at + block)) {
+      const Interval range{at, std::min(last, at + block)};
+      add(range, residual.angle_weight().segment(range.first, range.length()));
+    }
   }
-  if (resting < samples) add({resting, resting + 1}, VectorXd::Constant(1, residual.angle_weight().tail(samples - resting).norm()));
+  rest_until(samples);
   return information.selfadjointView<Eigen::Lower>();
 }
 

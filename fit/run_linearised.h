@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "core/exact_step.h"
+#include "fit/rest_rows.h"
 #include "fit/run_residual.h"
 
 // What RunResidual's arithmetic shares between its linear and its nonlinear path. Not for others to include.
@@ -13,6 +14,10 @@
 namespace unrig {
 
 namespace run_rows {
+
+inline Eigen::MatrixXd triangle_of(const Eigen::HouseholderQR<Eigen::MatrixXd>& qr) {
+  return qr.matrixQR().topRows(std::min(qr.rows(), qr.cols())).triangularView<Eigen::Upper>();
+}
 
 /// The upper triangular (or trapezoidal) factor of `rows`: the same inner products in no more rows than columns.
 inline Eigen::MatrixXd compress(Eigen::MatrixXd rows) {
@@ -84,6 +89,52 @@ class Eliminator {
   bool deficient_ = false;
 };
 
+/// Weighted rows of a block on their way through its rotations: those that c reaches, and what is left of the others.
+struct Rotated {
+  std::vector<Eigen::MatrixXd> kept, others;
+};
+
+/// One channel over one segment. A segment at rest spans only the free response and the offset: its rows are rotated, stretch by stretch and then those kept of
+/// all stretches together, so that few of them hold all that c can reach, and the others only what is left. One in which the shaft moves is rotated where its
+/// own splines, the free response and the offset are clearly fewer than its samples.
+class Block {
+ public:
+  using Rotation = std::shared_ptr<const Eigen::HouseholderQR<Eigen::MatrixXd>>;
+
+  Interval samples;
+  bool moving = false;
+  Eigen::Index channel = 0;
+  Eigen::MatrixXd start;         ///< d state / d c at the segment's start
+  Eigen::MatrixXd rows;          ///< nonlinear systems: d y / d c where the shaft moves, else d y / d state at the segment's start
+  Eigen::Index smooth_from = 0;  ///< at rest: the sample from which on whole stretches are polynomials; samples.last where none is
+
+  Block(const Interval& of, bool moves, Eigen::Index in_channel, Eigen::MatrixXd from, Eigen::MatrixXd tangents, Eigen::Index smooth)
+      : samples(of), moving(moves), channel(in_channel), start(std::move(from)), rows(std::move(tangents)), smooth_from(smooth) {}
+
+  bool is_smooth(const Interval& stretch) const { return !moving && stretch.first >= smooth_from && stretch.length() == rest_rows::stretch_samples; }
+
+  /// Sets up the rotation of the next stretch, from its weighted rows over [state at the segment's start | offset]; returns those kept.
+  Eigen::MatrixXd add_stretch(Eigen::MatrixXd span);
+  /// The same for a constant weight, from the rotation for a weight of one.
+  Eigen::MatrixXd add_stretch(double weight, const Rotation& rotation);
+  /// A stretch whose rows are few already.
+  void add_smooth_stretch() { rotations_.emplace_back(); }
+  /// Rotates the rows kept of all stretches together; returns what c does to them.
+  Eigen::MatrixXd join(const std::vector<Eigen::MatrixXd>& spans, Eigen::Index offset);
+  /// All of that from `rows`.
+  Eigen::MatrixXd rotate_rows(const Eigen::VectorXd& w, Eigen::Index offset);
+
+  /// Takes the rows of some of its samples, whole stretches of them.
+  void rotate(const Interval& some, Eigen::MatrixXd all, Rotated& rotated) const;
+  /// What c reaches of all rows taken; what is left joins the others.
+  Eigen::MatrixXd reached(Rotated& rotated) const;
+  Eigen::MatrixXd reached_of(const Eigen::MatrixXd& all) const;
+
+ private:
+  std::vector<Rotation> rotations_;  // per stretch, or of the whole motion; none where the rows are few already
+  Rotation joint_;                   // of what several stretches keep
+};
+
 }  // namespace run_rows
 
 /// The model at one theta, without partials: its exact step, what the inputs alone do, where the unknown motion takes the states, and the rows
@@ -92,41 +143,13 @@ struct RunResidual::Linearised {
   LinearSystem system;
   ExactStep step;
   Eigen::MatrixXd known;          // response to the measured inputs, samples x channels, empty without
-  Eigen::MatrixXd spline;         // states after a unit spline, n x samples
+  Eigen::MatrixXd spline;         // states after a unit spline, n x samples of the longest motion
   Eigen::MatrixXd spline_summed;  // and their running sum: states after splines at every sample
-  std::vector<Eigen::MatrixXd> free;  // rows of the free response per channel, for the longest segment at rest
+  std::vector<rest_rows::FreeRows> free;  // free response per channel, for a stretch at rest or the longest motion
+  Eigen::MatrixXd leap;                   // transition over a stretch at rest
+  bool polynomials = false;               // whether what is left of a rest may be looked at as polynomials
 
-  /// One channel over one segment. A segment at rest spans only the free response and the offset: `at_rest` rotates its rows so that the first
-  /// `kept` of them hold all that c can reach, and the others only what is left.
-  struct Block {
-    Interval samples;
-    bool moving = false;
-    Eigen::Index channel = 0, kept = 0;
-    std::shared_ptr<const Eigen::HouseholderQR<Eigen::MatrixXd>> at_rest;
-    Eigen::MatrixXd rows;   // nonlinear systems: d y / d c where the shaft moves, else d y / d state at the segment's start
-    Eigen::MatrixXd start;  // and that state's d / d c
-
-    /// Sets up the rotation of a segment at rest, from the free response `rows` of its channel; returns what c does to the rows that are kept.
-    Eigen::MatrixXd rotate(const Eigen::VectorXd& w, const Eigen::Ref<const Eigen::MatrixXd>& free_rows, const Eigen::MatrixXd& start_slope, Eigen::Index offset) {
-      const Eigen::Index states = free_rows.cols();
-      Eigen::MatrixXd span(w.size(), states + 1);
-      span.leftCols(states) = w.asDiagonal() * free_rows;
-      span.col(states) = w;
-      kept = std::min(w.size(), states + 1);
-      at_rest = std::make_shared<const Eigen::HouseholderQR<Eigen::MatrixXd>>(std::move(span));
-      const Eigen::MatrixXd triangle = at_rest->matrixQR().topRows(kept).triangularView<Eigen::Upper>();
-      Eigen::MatrixXd reach = triangle.leftCols(states) * start_slope;
-      reach.col(offset) += triangle.col(states);
-      return reach;
-    }
-    /// Weighted rows of this block: those that c reaches, and the others.
-    std::pair<Eigen::MatrixXd, Eigen::MatrixXd> split(Eigen::MatrixXd all) const {
-      if (moving) return {std::move(all), Eigen::MatrixXd()};
-      all.applyOnTheLeft(at_rest->householderQ().adjoint());
-      return {all.topRows(kept), all.bottomRows(all.rows() - kept)};
-    }
-  };
-  std::vector<Block> blocks;
+  std::vector<run_rows::Block> blocks;  // segment by segment, channel by channel
   std::shared_ptr<const Linearised> tangents;  // of a nonlinear run with prescribed motion: its equivalent linear system, which c is searched along
 
   /// Solves the stacked rows [c | y] for c, beside a sum of squares that c cannot reach.

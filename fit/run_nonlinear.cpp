@@ -93,7 +93,7 @@ bool RunResidual::stack_nonlinear_rows(Linearised& lin, const VectorXd& theta, c
     if (!response.finite) return false;
     for (Index c = 0; c < measured_.cols(); ++c) {
       const auto w = weight_.col(c).segment(s.first, s.length());
-      Linearised::Block block{s, segment.moving, c, s.length(), nullptr, std::move(response.tangent[static_cast<std::size_t>(c)]), {}};
+      run_rows::Block block{s, segment.moving, c, start, std::move(response.tangent[static_cast<std::size_t>(c)]), s.last};
       VectorXd y = measured_.col(c).segment(s.first, s.length()) - response.output.col(c);  // beside the offset, which stays linear
       MatrixXd reach;
       if (segment.moving) {
@@ -101,14 +101,14 @@ bool RunResidual::stack_nonlinear_rows(Linearised& lin, const VectorXd& theta, c
         block.rows.col(first_offset_ + c).setOnes();
         reach = w.asDiagonal() * block.rows;
       } else {
-        block.start = start;
         y += block.rows * (start * linear);
-        reach = block.rotate(w, block.rows, start, first_offset_ + c);
+        reach = block.rotate_rows(w, first_offset_ + c);
       }
-      const auto [reached, others] = block.split(w.cwiseProduct(y));
-      unreachable += others.squaredNorm();
+      run_rows::Rotated rotated;
+      block.rotate(s, w.cwiseProduct(y), rotated);
       MatrixXd together(reach.rows(), unknowns_ + 1);
-      together << reach, reached;
+      together << reach, block.reached(rotated);
+      for (const MatrixXd& others : rotated.others) unreachable += others.squaredNorm();
       rows.push_back(std::move(together));
       lin.blocks.push_back(std::move(block));
     }
@@ -135,6 +135,7 @@ std::shared_ptr<RunResidual::Linearised> RunResidual::equivalent_linear(const Li
   for (DualMatrix* m : {&system.B, &system.D}) *m = m->block(0, 0, m->rows(), measured);
   plain->step = exact_step(system, run_->dt);
   prepare_linear(*plain);
+  plain->polynomials = false;  // what the nonlinear model leaves of the readings is looked at sample by sample
   stack_rows(*plain);
   return plain;
 }
@@ -205,9 +206,9 @@ void RunResidual::search_along_equivalent(Linearised& lin, const VectorXd& theta
     bool arrived = false;
     for (int i = 0; i < most && !arrived; ++i) {
       std::vector<MatrixXd> rows;
-      for (const Linearised::Block& block : plain->blocks) {
+      for (const run_rows::Block& block : plain->blocks) {
         const Interval& s = block.samples;
-        rows.push_back(block.split(weight_.col(block.channel).segment(s.first, s.length()).cwiseProduct(point.left.col(block.channel).segment(s.first, s.length()))).first);
+        rows.push_back(block.reached_of(weight_.col(block.channel).segment(s.first, s.length()).cwiseProduct(point.left.col(block.channel).segment(s.first, s.length()))));
       }
       for (const MatrixXd& angle : angle_rows_) rows.emplace_back(angle.col(unknowns_) - angle.leftCols(unknowns_) * point.linear);
       const MatrixXd rotated = plain->eliminate->rotated(run_rows::stacked(rows, 1));
@@ -241,6 +242,7 @@ void RunResidual::follow_nonlinear_partials(const LinearSystem& system, const Ve
   const auto parameters = static_cast<Index>(model_->parameters().size());
   const VectorXd jerk = whole_jerk(linear);
   NonlinearDrive from{initial_state(linear, system.states()), {}, {}, MatrixXd(system.states(), 0), {}};
+  std::size_t block = 0;
   for (const Segment& segment : segments_) {
     const Interval s = counted(segment);
     if (s.length() <= 0) break;
@@ -250,7 +252,7 @@ void RunResidual::follow_nonlinear_partials(const LinearSystem& system, const Ve
       MatrixXd m(s.length(), parameters + 1);
       m << response.tangent[static_cast<std::size_t>(c)], response.output.col(c);
       m.col(parameters).array() += linear[first_offset_ + c];
-      take(s, c, std::move(m));
+      take(block++, s, std::move(m));
     }
     from.start = response.end;
     from.start_partial = response.end_tangent;

@@ -7,6 +7,7 @@
 #include <fmt/format.h>
 
 #include "core/run_inputs.h"
+#include "fit/run_linearised.h"
 
 namespace unrig {
 
@@ -103,7 +104,10 @@ RunResidual::RunResidual(const AeroelasticModel& model, const Run& run, std::vec
   Index at = 0;
   for (const Interval& i : active) {
     if (i.first > at) segments_.push_back({{at, i.first}, false});
-    segments_.push_back({i, true});
+    if (i.first < at)  // the last splines of one window still act when the next begins
+      segments_.back().samples.last = i.last;
+    else
+      segments_.push_back({i, true});
     at = i.last;
   }
   if (at < n) segments_.push_back({{at, n}, false});
@@ -139,11 +143,7 @@ void RunResidual::prepare_angle_rows() {
     const auto w = angle_weight_.segment(s.first, s.length());
     const auto y = angle_.segment(s.first, s.length());
     if (segment.moving) {
-      MatrixXd rows = MatrixXd::Zero(s.length(), unknowns_ + 1);
-      rows.leftCols(motion_.unknowns()) = w.asDiagonal() * motion_.angle_columns(s);
-      rows.col(angle_offset_) = w;
-      rows.col(unknowns_) = w.cwiseProduct(y);
-      angle_rows_.push_back(std::move(rows));
+      angle_rows_.push_back(angle_rows_in_motion(s));
       continue;
     }
     const double total = w.squaredNorm();
@@ -156,6 +156,36 @@ void RunResidual::prepare_angle_rows() {
     rows(1, unknowns_) = std::sqrt((w.array() * (y.array() - mean)).square().sum());
     angle_rows_.push_back(std::move(rows));
   }
+  MatrixXd all = run_rows::stacked(angle_rows_, unknowns_ + 1);
+  if (all.rows() > 2 * all.cols()) angle_rows_ = {run_rows::compress(std::move(all))};
+}
+
+/// Motion unknowns whose splines begin in these samples: the first of them, and how many.
+std::pair<Index, Index> RunResidual::splines_in(const Interval& samples) const {
+  const auto begins_before = [](const MotionBasis::Column& column, Index sample) { return column.first < sample; };
+  const auto place = [&](Index sample) { return std::lower_bound(motion_.columns().begin(), motion_.columns().end(), sample, begins_before) - motion_.columns().begin(); };
+  return {place(samples.first), place(samples.last) - place(samples.first)};
+}
+
+/// Rows [c | angle] while the shaft moves: the splines that begin in these samples, beside the level that the earlier ones have led to.
+MatrixXd RunResidual::angle_rows_in_motion(const Interval& s) const {
+  const auto [first, count] = splines_in(s);
+  MatrixXd columns = motion_.angle_columns(s);
+  MatrixXd span(s.length(), count + 2);  // own splines, level, angle
+  span << columns.middleCols(first, count), VectorXd::Ones(s.length()), angle_.segment(s.first, s.length());
+  span = angle_weight_.segment(s.first, s.length()).asDiagonal() * span;
+  if (span.rows() > 2 * span.cols()) span = run_rows::compress(std::move(span));
+  MatrixXd rows = MatrixXd::Zero(span.rows(), unknowns_ + 1);
+  rows.leftCols(first) = span.col(count) * columns.row(0).head(first);
+  rows.middleCols(first, count) = span.leftCols(count);
+  rows.col(angle_offset_) = span.col(count);
+  rows.col(unknowns_) = span.col(count + 1);
+  return rows;
+}
+
+void RunResidual::weights_changed() {
+  smooth_readings_.clear();
+  prepare_angle_rows();
 }
 
 void RunResidual::set_motion_prior(const MatrixXd& rows) {
@@ -172,7 +202,7 @@ void RunResidual::keep_noise_of(const RunResidual& other) {
   angle_weight_ = other.angle_weight_;
   spikes_ = other.spikes_;
   tempered_ = other.tempered_;
-  prepare_angle_rows();
+  weights_changed();
 }
 
 RunResidual RunResidual::with_motion(std::vector<MotionBasis::Window> windows) const {
@@ -198,7 +228,7 @@ void RunResidual::settle_noise(const VectorXd& theta) {
     settle(channels_[c], measured_.col(column) - p.output.col(column), weight_.col(column), sigma_[c]);
   }
   if (angle_offset_ >= 0) settle("alpha", angle_ - p.motion.angle - VectorXd::Constant(angle_.size(), p.angle_offset[0]), angle_weight_, angle_sigma_);
-  prepare_angle_rows();
+  weights_changed();
 }
 
 Index RunResidual::reject_spikes(const VectorXd& theta, double limit) {

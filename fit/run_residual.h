@@ -1,16 +1,24 @@
 #pragma once
 #include <Eigen/Core>
 #include <functional>
+#include <map>
 #include <memory>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "core/aeroelastic_model.h"
 #include "core/motion.h"
 #include "core/response.h"
 #include "core/run.h"
+#include "fit/rest_rows.h"
 
 namespace unrig {
+
+namespace run_rows {
+class Block;
+struct Rotated;
+}  // namespace run_rows
 
 /// How a run is held against the model.
 struct RunOptions {
@@ -29,7 +37,8 @@ struct RunOptions {
 /// least squares along the response), because exact ones would cost n x n x (knots) a sample. The prediction itself and its partials in theta are exact in
 /// both; where c stops is then off by the difference of the tangents times what the residual happens to hold of them, a small part of c's own error.
 ///
-/// Long stretches without jerk are compressed exactly: their rows span only the free response of the model, an n-dimensional space.
+/// Rests without jerk are compressed exactly: their rows span only the free response of the model, an n-dimensional space. Once its vibrations have died out
+/// (below 1e-11), a stretch of 1024 samples is looked at as the few numbers that a polynomial needs (fit/rest_rows.h), so that a long rest costs next to nothing.
 class RunResidual {
  public:
   /// `motion`: windows in which the shaft may move (empty for runs without prescribed pitch).
@@ -132,6 +141,7 @@ class RunResidual {
   void temper(double factor) {
     weight_ *= tempered_ / factor;
     tempered_ = factor;
+    weights_changed();
   }
   double tempered() const { return tempered_; }
 
@@ -152,6 +162,7 @@ class RunResidual {
     bool moving;
   };
   std::shared_ptr<Linearised> linearise(const Eigen::VectorXd& theta) const;
+  void weights_changed();
   void stack_rows(Linearised& lin) const;
   Eigen::VectorXd whole_jerk(const Eigen::VectorXd& linear) const;
   bool stack_nonlinear_rows(Linearised& lin, const Eigen::VectorXd& theta, const Eigen::VectorXd& linear) const;
@@ -163,19 +174,26 @@ class RunResidual {
   void solve_nonlinear(Linearised& lin, const Eigen::VectorXd& theta) const;
   void search_along_tangents(Linearised& lin, const Eigen::VectorXd& theta, NonlinearPoint point) const;
   void search_along_equivalent(Linearised& lin, const Eigen::VectorXd& theta, NonlinearPoint point) const;
-  Eigen::MatrixXd prediction_slope(const Linearised& lin, std::size_t block, const Eigen::MatrixXd& linear_slope) const;
+  void add_prediction_slope(const Linearised& lin, const run_rows::Block& block, const Eigen::MatrixXd& linear_slope, Eigen::MatrixXd& slope) const;
   void prepare_linear(Linearised& lin) const;
-  using TakeRows = std::function<void(const Interval& samples, Eigen::Index channel, Eigen::MatrixXd rows)>;
-  void follow_partials(const Eigen::VectorXd& theta, const Eigen::VectorXd& linear, const TakeRows& take) const;
+  using TakeRows = std::function<void(std::size_t block, const Interval& samples, Eigen::MatrixXd rows)>;
+  void follow_partials(const Eigen::VectorXd& theta, const Eigen::VectorXd& linear, const std::vector<run_rows::Block>& blocks, const TakeRows& take) const;
   void follow_nonlinear_partials(const LinearSystem& system, const Eigen::VectorXd& theta, const Eigen::VectorXd& linear, const TakeRows& take) const;
   Eigen::MatrixXd jerk_slope(const Interval& samples) const;
   LinearSystem differentiable_system(const Eigen::VectorXd& theta) const;
-  Eigen::MatrixXd motion_state_columns(const Linearised& lin, Eigen::Index sample) const;
+  Eigen::MatrixXd motion_state_columns(const Linearised& lin, const Interval& samples) const;
+  Eigen::MatrixXd state_behind(const Linearised& lin, const Segment& segment, const Interval& samples, const Eigen::MatrixXd& start) const;
+  Eigen::Index smooth_from(const Linearised& lin, const Interval& samples, const Eigen::MatrixXd& start) const;
+  Eigen::MatrixXd reach_at_rest(const Linearised& lin, run_rows::Block& block) const;
+  Eigen::MatrixXd reach_in_motion(const Linearised& lin, run_rows::Block& block) const;
+  std::pair<Eigen::Index, Eigen::Index> splines_in(const Interval& samples) const;
+  run_rows::Rotated rotated_readings(const Linearised& lin, const run_rows::Block& block, double& beside) const;
+  const rest_rows::SmoothReadings& smooth_readings(Eigen::Index channel, const Interval& stretch) const;
   Interval counted(const Segment& segment) const;
   Eigen::MatrixXd motion_output_columns(const Linearised& lin, Eigen::Index channel, const Interval& samples) const;
   Eigen::VectorXd initial_state(const Eigen::VectorXd& linear, Eigen::Index states) const;
-  Eigen::MatrixXd segment_start(const Linearised& lin, const Interval& samples) const;
   void prepare_angle_rows();
+  Eigen::MatrixXd angle_rows_in_motion(const Interval& samples) const;
 
   const AeroelasticModel* model_;
   const Run* run_;
@@ -194,6 +212,7 @@ class RunResidual {
   std::vector<Eigen::MatrixXd> angle_rows_;  ///< [c | angle], weighted; they do not depend on theta
   std::vector<Eigen::Index> differentiated_;
   Eigen::MatrixXd inputs_;  ///< samples + 1 rows
+  mutable std::map<std::pair<Eigen::Index, Eigen::Index>, rest_rows::SmoothReadings> smooth_readings_;  ///< by channel and first sample, where they were asked for
   Eigen::Index spikes_ = 0;
   Eigen::Index last_sample_ = 0;
 

@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <cmath>
+#include <optional>
 
 #include "core/nonlinear_response.h"
 #include "fit/run_linearised.h"
@@ -27,6 +28,12 @@ MatrixXd power(MatrixXd base, Index exponent) {
   return result;
 }
 
+/// A shaft that has come to rest stands exactly still: the rounding of its acceleration, eps/dt^3 of a spline, would turn it on with the square of the time.
+void stand_still(MatrixXd& state, Index motion, const RowVectorXd& angle) {
+  state.row(motion) = angle;
+  state.middleRows(motion + 1, 2).setZero();
+}
+
 }  // namespace
 
 VectorXd RunResidual::initial_state(const VectorXd& linear, Index states) const {
@@ -50,29 +57,33 @@ std::shared_ptr<RunResidual::Linearised> RunResidual::linearise(const VectorXd& 
 void RunResidual::prepare_linear(Linearised& lin) const {
   if (inputs_.cols() > 0)
     lin.known = drive(lin.system, lin.step, DualMatrix(MatrixXd::Zero(lin.system.states(), 1)), run_->samples(), {}, inputs_, Partials::none).output;
-  Index longest = 0, last_motion = 0;
+  Index longest_rest = 0, longest_motion = 0;
   for (const Segment& s : segments_) {
-    if (s.moving) last_motion = s.samples.last;
-    if (!s.moving || !free_.empty()) longest = std::max(longest, counted(s).length());
+    Index& longest = s.moving ? longest_motion : longest_rest;
+    longest = std::max(longest, counted(s).length());
   }
-  lin.free = free_response_rows(lin.system, lin.step, longest);
+  const Index samples = std::max(std::min(longest_rest, rest_rows::stretch_samples), longest_motion);
+  for (MatrixXd& rows : free_response_rows(lin.system, lin.step, samples)) lin.free.emplace_back(std::move(rows));
+  lin.leap = power(lin.step.transition.value, rest_rows::stretch_samples);
+  lin.polynomials = inputs_.cols() == 0;
   if (motion_.unknowns() > 0) {
-    lin.spline = spline_states(lin.step, last_motion + 1 - motion_.columns().front().first);
+    lin.spline = spline_states(lin.step, longest_motion + 1);
     lin.spline_summed = lin.spline;
     for (Index k = 1; k < lin.spline.cols(); ++k) lin.spline_summed.col(k) += lin.spline_summed.col(k - 1);
   }
 }
 
-/// d output / d motion unknowns over a segment in which the shaft moves: the response to one spline, shifted.
+/// d output / d motion unknowns over a segment in which the shaft moves, of the splines that begin in it: the response to one spline, shifted.
 MatrixXd RunResidual::motion_output_columns(const Linearised& lin, Index channel, const Interval& samples) const {
   const RowVectorXd unit = lin.system.C.value.row(channel) * lin.spline, summed = lin.system.C.value.row(channel) * lin.spline_summed;
   MatrixXd columns = MatrixXd::Zero(samples.length(), motion_.unknowns());
   for (Index j = 0; j < motion_.unknowns(); ++j) {
     const MotionBasis::Column& column = motion_.columns()[static_cast<std::size_t>(j)];
+    if (column.first < samples.first) continue;
     const auto add = [&](const RowVectorXd& response, Index knot, double amount) {
-      const Index from = std::max(samples.first, knot + 1);
+      const Index from = knot + 1;
       if (amount == 0 || from >= samples.last) return;
-      columns.col(j).tail(samples.last - from) += amount * response.segment(from - knot, samples.last - from).transpose();
+      columns.col(j).tail(samples.last - from) += amount * response.segment(1, samples.last - from).transpose();
     };
     for (Index i = 0; i < column.value.size(); ++i) add(unit, column.first + i, column.value[i]);
     add(summed, column.first + column.value.size(), column.tail);
@@ -80,64 +91,150 @@ MatrixXd RunResidual::motion_output_columns(const Linearised& lin, Index channel
   return columns;
 }
 
-/// d state / d motion unknowns at `sample`.
-MatrixXd RunResidual::motion_state_columns(const Linearised& lin, Index sample) const {
+/// d state / d motion unknowns behind such a segment, of the same splines.
+MatrixXd RunResidual::motion_state_columns(const Linearised& lin, const Interval& samples) const {
   MatrixXd columns = MatrixXd::Zero(lin.spline.rows(), motion_.unknowns());
   for (Index j = 0; j < motion_.unknowns(); ++j) {
     const MotionBasis::Column& column = motion_.columns()[static_cast<std::size_t>(j)];
+    if (column.first < samples.first) continue;
     for (Index i = 0; i < column.value.size(); ++i) {
-      const Index since = sample - column.first - i;
+      const Index since = samples.last - column.first - i;
       if (since <= 0) break;
       columns.col(j) += column.value[i] * lin.spline.col(since);
     }
-    const Index since_tail = sample - column.first - column.value.size();
+    const Index since_tail = samples.last - column.first - column.value.size();
     if (column.tail != 0 && since_tail > 0) columns.col(j) += column.tail * lin.spline_summed.col(since_tail);
   }
   return columns;
 }
 
-/// d state / d c at the first sample of a segment.
-MatrixXd RunResidual::segment_start(const Linearised& lin, const Interval& samples) const {
-  MatrixXd start = MatrixXd::Zero(lin.system.states(), unknowns_);
-  if (motion_.unknowns() > 0) start.leftCols(motion_.unknowns()) = motion_state_columns(lin, samples.first);
-  if (free_.empty()) return start;
-  const MatrixXd since = samples.first == 0 ? MatrixXd::Identity(lin.system.states(), lin.system.states()) : power(lin.step.transition.value, samples.first);
-  for (std::size_t i = 0; i < free_.size(); ++i) start.col(first_state_ + static_cast<Index>(i)) = since.col(free_[i]);
-  return start;
+/// d state / d c behind a segment, from that at its start.
+MatrixXd RunResidual::state_behind(const Linearised& lin, const Segment& segment, const Interval& samples, const MatrixXd& start) const {
+  MatrixXd behind = power(lin.step.transition.value, samples.length()) * start;
+  if (segment.moving && motion_.unknowns() > 0) behind.leftCols(motion_.unknowns()) += motion_state_columns(lin, samples);
+  if (segment.moving && samples.last < run_->samples()) {
+    RowVectorXd angle = RowVectorXd::Zero(unknowns_);
+    angle.head(motion_.unknowns()) = motion_.angle_columns({samples.last, samples.last + 1});
+    stand_still(behind, lin.system.motion, angle);
+  }
+  return behind;
+}
+
+/// The sample of a rest from which on nothing that c can do is more than a polynomial over whole stretches. Slopes in theta, t exp(-at) where c does
+/// exp(-at), get a stretch more.
+Index RunResidual::smooth_from(const Linearised& lin, const Interval& samples, const MatrixXd& start) const {
+  constexpr Index length = rest_rows::stretch_samples;
+  if (!lin.polynomials) return samples.last;
+  MatrixXd state = start;
+  for (Index first = samples.first; first + 2 * length <= samples.last; first += length, state = lin.leap * state)
+    if (std::all_of(lin.free.begin(), lin.free.end(), [&](const rest_rows::FreeRows& free) { return free.is_smooth(state, start); })) return first + length;
+  return samples.last;
+}
+
+/// The stretches of a block at rest: their rotations, and what c does to the rows that are kept.
+MatrixXd RunResidual::reach_at_rest(const Linearised& lin, run_rows::Block& block) const {
+  const rest_rows::FreeRows& free = lin.free[static_cast<std::size_t>(block.channel)];
+  const Index n = lin.system.states();
+  std::vector<MatrixXd> spans;
+  MatrixXd since = MatrixXd::Identity(n, n), smooth_since;  // transition up to the stretch; with the polynomials of the response behind it
+  for (Index first = block.samples.first; first < block.samples.last; first += rest_rows::stretch_samples) {
+    const Interval stretch{first, std::min(first + rest_rows::stretch_samples, block.samples.last)};
+    if (block.is_smooth(stretch)) {
+      smooth_since = smooth_since.size() > 0 ? MatrixXd(smooth_since * lin.leap) : MatrixXd(free.smooth * since);
+      const rest_rows::SmoothReadings& readings = smooth_readings(block.channel, stretch);
+      MatrixXd span(rest_rows::smooth_terms, n + 1);
+      span << readings.weight * smooth_since, readings.weight * rest_rows::smooth_constant();
+      spans.push_back(std::move(span));
+      block.add_smooth_stretch();
+      continue;
+    }
+    // The broken stretch at the end of the rest.
+    if (smooth_since.size() > 0) since = power(lin.step.transition.value, first - block.samples.first);
+    const auto w = weight_.col(block.channel).segment(first, stretch.length());
+    MatrixXd span(stretch.length(), n + 1);
+    if (free.rotation && stretch.length() == rest_rows::stretch_samples && w[0] > 0 && (w.array() == w[0]).all()) {
+      span = block.add_stretch(w[0], free.rotation);
+    } else {
+      span << w.asDiagonal() * free.rows.topRows(stretch.length()), w;
+      span = block.add_stretch(std::move(span));
+    }
+    span.leftCols(n) *= since;
+    spans.push_back(std::move(span));
+    since = since * lin.leap;
+  }
+  return block.join(spans, first_offset_ + block.channel);
+}
+
+/// What c does to the weighted readings of a block in which the shaft moves: by the splines that begin in it, by the state at its start, and by the offset.
+MatrixXd RunResidual::reach_in_motion(const Linearised& lin, run_rows::Block& block) const {
+  const Interval& s = block.samples;
+  const auto w = weight_.col(block.channel).segment(s.first, s.length());
+  const MatrixXd& free = lin.free[static_cast<std::size_t>(block.channel)].rows;
+  const bool from_rest = block.start.isZero(0);
+  const auto [first, count] = splines_in(s);
+  const Index n = from_rest ? 0 : lin.system.states();
+  MatrixXd span(s.length(), count + n + 1);
+  span << motion_output_columns(lin, block.channel, s).middleCols(first, count), free.topLeftCorner(s.length(), n), VectorXd::Ones(s.length());
+  span = w.asDiagonal() * span;
+  if (span.rows() > 2 * span.cols()) span = block.add_stretch(std::move(span));
+  MatrixXd reach = MatrixXd::Zero(span.rows(), unknowns_);
+  reach.middleCols(first, count) = span.leftCols(count);
+  if (n > 0) reach += span.middleCols(count, n) * block.start;
+  reach.col(first_offset_ + block.channel) += span.rightCols(1);
+  return reach;
+}
+
+/// Weighted readings of a block on their way through its rotations, without what the inputs do.
+run_rows::Rotated RunResidual::rotated_readings(const Linearised& lin, const run_rows::Block& block, double& beside) const {
+  run_rows::Rotated rotated;
+  const Interval& s = block.samples;
+  const Index length = block.moving ? s.length() : rest_rows::stretch_samples;
+  for (Index first = s.first; first < s.last; first += length) {
+    const Interval stretch{first, std::min(first + length, s.last)};
+    if (block.is_smooth(stretch)) {
+      const rest_rows::SmoothReadings& readings = smooth_readings(block.channel, stretch);
+      block.rotate(stretch, readings.reading, rotated);
+      beside += readings.beside;
+      continue;
+    }
+    VectorXd y = measured_.col(block.channel).segment(first, stretch.length());
+    if (lin.known.size() > 0) y -= lin.known.col(block.channel).segment(first, stretch.length());
+    block.rotate(stretch, weight_.col(block.channel).segment(first, stretch.length()).cwiseProduct(y), rotated);
+  }
+  return rotated;
+}
+
+/// One stretch of readings at rest against polynomials; it does not depend on theta.
+const rest_rows::SmoothReadings& RunResidual::smooth_readings(Index channel, const Interval& stretch) const {
+  const std::pair<Index, Index> key{channel, stretch.first};
+  const auto known = smooth_readings_.find(key);
+  if (known != smooth_readings_.end()) return known->second;
+  return smooth_readings_
+      .emplace(key, rest_rows::smooth_readings(weight_.col(channel).segment(stretch.first, stretch.length()), measured_.col(channel).segment(stretch.first, stretch.length())))
+      .first->second;
 }
 
 /// All rows [c | y], those of segments at rest rotated and cut to what c can reach; solves for c.
 void RunResidual::stack_rows(Linearised& lin) const {
   std::vector<MatrixXd> rows;
   double unreachable = 0;
+  MatrixXd start = MatrixXd::Zero(lin.system.states(), unknowns_);
+  for (std::size_t i = 0; i < free_.size(); ++i) start(free_[i], first_state_ + static_cast<Index>(i)) = 1;
   for (const Segment& segment : segments_) {
     const Interval s = counted(segment);
-    const Index length = s.length();
-    if (length <= 0) break;
-    const MatrixXd start = segment.moving ? MatrixXd() : segment_start(lin, s);
+    if (s.length() <= 0) break;
+    const Index smooth = segment.moving ? s.last : smooth_from(lin, s, start);
     for (Index c = 0; c < measured_.cols(); ++c) {
-      const auto w = weight_.col(c).segment(s.first, length);
-      VectorXd y = measured_.col(c).segment(s.first, length);
-      if (lin.known.size() > 0) y -= lin.known.col(c).segment(s.first, length);
-      y = w.cwiseProduct(y);
-      Linearised::Block block{s, segment.moving, c, length, nullptr, {}, {}};
-      MatrixXd reach;
-      if (segment.moving) {
-        reach = MatrixXd::Zero(length, unknowns_);
-        reach.leftCols(motion_.unknowns()) = motion_output_columns(lin, c, s);
-        if (!free_.empty()) reach.middleCols(first_state_, static_cast<Index>(free_.size())) = lin.free[static_cast<std::size_t>(c)].topRows(length) * segment_start(lin, s).middleCols(first_state_, static_cast<Index>(free_.size()));
-        reach.col(first_offset_ + c).setOnes();
-        reach = w.asDiagonal() * reach;
-      } else {
-        reach = block.rotate(w, lin.free[static_cast<std::size_t>(c)].topRows(length), start, first_offset_ + c);
-      }
-      const auto [reached, others] = block.split(std::move(y));
-      unreachable += others.squaredNorm();
+      run_rows::Block block{s, segment.moving, c, start, {}, smooth};
+      const MatrixXd reach = segment.moving ? reach_in_motion(lin, block) : reach_at_rest(lin, block);
+      run_rows::Rotated rotated = rotated_readings(lin, block, unreachable);
       MatrixXd together(reach.rows(), unknowns_ + 1);
-      together << reach, reached;
+      together << reach, block.reached(rotated);
+      for (const MatrixXd& others : rotated.others) unreachable += others.squaredNorm();
       rows.push_back(std::move(together));
       lin.blocks.push_back(std::move(block));
     }
+    start = state_behind(lin, segment, s, start);
   }
   rows.insert(rows.end(), angle_rows_.begin(), angle_rows_.end());
   lin.settle(rows, unknowns_, unreachable);
@@ -165,7 +262,7 @@ namespace {
 
 /// What the parameters do to one channel over a segment at fixed c, beside its prediction: [d y / d theta | y].
 MatrixXd slopes_and_prediction(const Response& response, const Response& known, const Interval& s, Index channel, Index parameters) {
-  MatrixXd m = MatrixXd::Zero(s.length(), parameters + 1);
+  MatrixXd m = MatrixXd::Zero(response.output.rows(), parameters + 1);
   m.col(parameters) = response.output.col(channel);
   if (known.output.size() > 0) m.col(parameters) += known.output.col(channel).segment(s.first, s.length());
   for (Index j = 0; j < parameters; ++j) {
@@ -178,45 +275,70 @@ MatrixXd slopes_and_prediction(const Response& response, const Response& known, 
 
 }  // namespace
 
-/// Follows the model with its partials through all segments at fixed c, and hands [d y / d theta | y] of each channel and segment to `take`.
-void RunResidual::follow_partials(const VectorXd& theta, const VectorXd& linear, const TakeRows& take) const {
+/// Follows the model with its partials through all segments at fixed c, and hands [d y / d theta | y] of each channel to `take`, piece by piece. Stretches that are
+/// smooth in `blocks` are handed on as coefficients of polynomials; none where there are no blocks.
+void RunResidual::follow_partials(const VectorXd& theta, const VectorXd& linear, const std::vector<run_rows::Block>& blocks, const TakeRows& take) const {
   const LinearSystem system = differentiable_system(theta);
   if (!system.feedback.empty()) return follow_nonlinear_partials(system, theta, linear, take);
   const ExactStep step = exact_step(system, run_->dt);
   const auto parameters = static_cast<Index>(model_->parameters().size());
+  const Index channels = measured_.cols();
   Response known;
   if (inputs_.cols() > 0) known = drive(system, step, DualMatrix(MatrixXd::Zero(system.states(), 1)), run_->samples(), {}, inputs_, Partials::all);
+  const FreeResponse free(system, step, Partials::all);
+  std::optional<rest_rows::SmoothResponse> smooth;
   DualMatrix state(MatrixXd::Zero(system.states(), 1), parameters);
   state.value.col(0) = initial_state(linear, system.states());
-  VectorXd jerk;
-  if (motion_.unknowns() > 0) jerk = motion_of(motion_.coefficients(linear.head(motion_.unknowns())), run_->dt).jerk;
+  const Motion motion = motion_.unknowns() > 0 ? motion_of(motion_.coefficients(linear.head(motion_.unknowns())), run_->dt) : Motion{};
+  std::size_t block = 0;
   for (const Segment& segment : segments_) {
     const Interval s = counted(segment);
     if (s.length() <= 0) break;
-    const Response response = segment.moving ? drive(system, step, state, s.length(), jerk.segment(s.first, s.length()), {}, Partials::all)
-                                             : coast(system, step, state, s.length(), Partials::all);
-    state = response.end;
-    for (Index c = 0; c < measured_.cols(); ++c) {
-      MatrixXd m = slopes_and_prediction(response, known, s, c, parameters);
-      m.col(parameters).array() += linear[first_offset_ + c];
-      take(s, c, std::move(m));
+    const Index length = segment.moving ? s.length() : rest_rows::stretch_samples;
+    for (Index first = s.first; first < s.last; first += length) {
+      const Interval stretch{first, std::min(first + length, s.last)};
+      const bool is_smooth = !blocks.empty() && blocks[block].is_smooth(stretch);
+      if (is_smooth && !smooth) smooth.emplace(free);
+      const Response response = is_smooth        ? smooth->from(state)
+                                : segment.moving ? drive(system, step, state, stretch.length(), motion.jerk.segment(first, stretch.length()), {}, Partials::all)
+                                                 : free.from(state, stretch.length());
+      state = response.end;
+      if (segment.moving && stretch.last < run_->samples()) stand_still(state.value, system.motion, motion.angle.segment(stretch.last, 1));
+      for (Index c = 0; c < channels; ++c) {
+        MatrixXd m = slopes_and_prediction(response, known, stretch, c, parameters);
+        m.col(parameters) += linear[first_offset_ + c] * (is_smooth ? rest_rows::smooth_constant() : VectorXd::Ones(stretch.length()));
+        take(block + static_cast<std::size_t>(c), stretch, std::move(m));
+      }
     }
+    block += static_cast<std::size_t>(channels);
   }
 }
 
 RunResidual::Evaluation RunResidual::differentiate(const Solution& solution) const {
   const Linearised& lin = solution.model->tangents ? *solution.model->tangents : *solution.model;
   const auto parameters = static_cast<Index>(model_->parameters().size());
-  std::vector<MatrixXd> reached, others;
-  std::size_t next = 0;
-  follow_partials(solution.theta, solution.linear, [&](const Interval& s, Index c, MatrixXd m) {
+  std::vector<run_rows::Rotated> rotated_blocks(lin.blocks.size());
+  double beside = 0;
+  follow_partials(solution.theta, solution.linear, lin.blocks, [&](std::size_t b, const Interval& s, MatrixXd m) {
     // Residual and its derivative, weighted: [-d y / d theta | measured - y].
+    const run_rows::Block& block = lin.blocks[b];
     m = -m;
-    m.col(parameters) += measured_.col(c).segment(s.first, s.length());
-    auto [top, bottom] = lin.blocks[next++].split(weight_.col(c).segment(s.first, s.length()).asDiagonal() * m);
-    reached.push_back(std::move(top));
-    if (bottom.rows() > 0) others.push_back(compress(std::move(bottom)));
+    if (block.is_smooth(s)) {
+      const rest_rows::SmoothReadings& readings = smooth_readings(block.channel, s);
+      m = readings.weight * m;
+      m.col(parameters) += readings.reading;
+      beside += readings.beside;
+    } else {
+      m.col(parameters) += measured_.col(block.channel).segment(s.first, s.length());
+      m = weight_.col(block.channel).segment(s.first, s.length()).asDiagonal() * m;
+    }
+    block.rotate(s, std::move(m), rotated_blocks[b]);
   });
+  std::vector<MatrixXd> reached, others{std::sqrt(beside) * RowVectorXd::Unit(parameters + 1, parameters)};
+  for (std::size_t b = 0; b < lin.blocks.size(); ++b) {
+    reached.push_back(lin.blocks[b].reached(rotated_blocks[b]));
+    others.insert(others.end(), rotated_blocks[b].others.begin(), rotated_blocks[b].others.end());
+  }
   for (const MatrixXd& rows : angle_rows_) {
     MatrixXd m = MatrixXd::Zero(rows.rows(), parameters + 1);
     m.col(parameters) = rows.col(unknowns_) - rows.leftCols(unknowns_) * solution.linear;
@@ -271,11 +393,13 @@ RunResidual::Prediction RunResidual::predict(const VectorXd& theta) const {
   }
   DualMatrix state(MatrixXd::Zero(lin.system.states(), 1));
   state.value.col(0) = initial_state(p.linear, lin.system.states());
+  const FreeResponse free(lin.system, lin.step, Partials::none);
   for (const Segment& segment : segments_) {
     const Interval& s = segment.samples;
     const Response response = segment.moving ? drive(lin.system, lin.step, state, s.length(), p.motion.jerk.segment(s.first, s.length()), {}, Partials::none)
-                                             : coast(lin.system, lin.step, state, s.length(), Partials::none);
+                                             : free.from(state, s.length());
     state = response.end;
+    if (segment.moving && s.last < run_->samples()) stand_still(state.value, lin.system.motion, p.motion.angle.segment(s.last, 1));
     p.output.middleRows(s.first, s.length()) = response.output;
   }
   if (lin.known.size() > 0) p.output += lin.known;
@@ -283,25 +407,29 @@ RunResidual::Prediction RunResidual::predict(const VectorXd& theta) const {
   return p;
 }
 
-/// d prediction / d c of one block, times what c does.
-MatrixXd RunResidual::prediction_slope(const Linearised& lin, std::size_t index, const MatrixXd& linear_slope) const {
-  const Linearised::Block& block = lin.blocks[index];
+/// Adds d prediction / d c of one block, times what c does, to the rows of its samples.
+void RunResidual::add_prediction_slope(const Linearised& lin, const run_rows::Block& block, const MatrixXd& linear_slope, MatrixXd& slope) const {
   const Interval& s = block.samples;
-  const auto count = static_cast<Index>(free_.size());
-  MatrixXd slope;
-  if (block.rows.size() > 0) {
-    slope = block.moving ? MatrixXd(block.rows * linear_slope) : MatrixXd(block.rows * (block.start * linear_slope));
-    if (block.moving) return slope;  // the offset is among the columns
-  } else if (block.moving) {
-    slope = motion_output_columns(lin, block.channel, s) * linear_slope.topRows(motion_.unknowns());
-    if (count > 0)
-      slope += lin.free[static_cast<std::size_t>(block.channel)].topRows(s.length()) *
-               (segment_start(lin, s).middleCols(first_state_, count) * linear_slope.middleRows(first_state_, count));
-  } else {
-    slope = lin.free[static_cast<std::size_t>(block.channel)].topRows(s.length()) * (segment_start(lin, s) * linear_slope);
+  auto own = slope.middleRows(s.first, s.length());
+  if (block.moving && block.rows.size() > 0) {  // the offset is among the columns
+    own += block.rows * linear_slope;
+    return;
   }
-  slope.rowwise() += linear_slope.row(first_offset_ + block.channel);
-  return slope;
+  own.rowwise() += linear_slope.row(first_offset_ + block.channel);
+  MatrixXd state = block.start * linear_slope;
+  if (block.rows.size() > 0) {
+    own += block.rows * state;
+    return;
+  }
+  const MatrixXd& free = lin.free[static_cast<std::size_t>(block.channel)].rows;
+  if (block.moving) {
+    own += motion_output_columns(lin, block.channel, s) * linear_slope.topRows(motion_.unknowns()) + free.topRows(s.length()) * state;
+    return;
+  }
+  for (Index first = 0; first < s.length(); first += rest_rows::stretch_samples, state = lin.leap * state) {
+    const Index length = std::min(rest_rows::stretch_samples, s.length() - first);
+    own.middleRows(first, length) += free.topRows(length) * state;
+  }
 }
 
 RunResidual::Sensitivity RunResidual::sensitivity(const VectorXd& theta) const {
@@ -312,14 +440,17 @@ RunResidual::Sensitivity RunResidual::sensitivity(const VectorXd& theta) const {
   const Index n = run_->samples();
   Sensitivity result;
   result.channels.assign(static_cast<std::size_t>(measured_.cols()), {VectorXd::Zero(n), MatrixXd::Zero(n, parameters)});
-  std::size_t next = 0;
-  follow_partials(theta, solution.linear, [&](const Interval& s, Index c, MatrixXd m) {
-    m.leftCols(parameters) += prediction_slope(lin, next++, e.linear_slope);  // c follows theta
-    m.col(parameters) = measured_.col(c).segment(s.first, s.length()) - m.col(parameters);
-    const MatrixXd weighted = weight_.col(c).segment(s.first, s.length()).asDiagonal() * m;
-    result.channels[static_cast<std::size_t>(c)].residual.segment(s.first, s.length()) = weighted.col(parameters);
-    result.channels[static_cast<std::size_t>(c)].slope.middleRows(s.first, s.length()) = weighted.leftCols(parameters);
+  follow_partials(theta, solution.linear, {}, [&](std::size_t block, const Interval& s, const MatrixXd& m) {
+    Sensitivity::PerChannel& channel = result.channels[block % result.channels.size()];
+    channel.residual.segment(s.first, s.length()) = -m.col(parameters);
+    channel.slope.middleRows(s.first, s.length()) = m.leftCols(parameters);
   });
+  for (const run_rows::Block& block : lin.blocks) add_prediction_slope(lin, block, e.linear_slope, result.channels[static_cast<std::size_t>(block.channel)].slope);  // c follows theta
+  for (Index c = 0; c < measured_.cols(); ++c) {
+    Sensitivity::PerChannel& channel = result.channels[static_cast<std::size_t>(c)];
+    channel.residual = weight_.col(c).cwiseProduct(channel.residual + measured_.col(c));
+    channel.slope = weight_.col(c).asDiagonal() * channel.slope;
+  }
   if (angle_offset_ >= 0) {
     const MatrixXd columns = motion_.angle_columns({0, n});
     const VectorXd predicted = (columns * e.linear.head(motion_.unknowns())).array() + e.linear[angle_offset_];

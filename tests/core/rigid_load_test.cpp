@@ -101,6 +101,26 @@ TEST(RigidLoad, CarriesItsSlopes) {
   EXPECT_LT((load.normal_force_by_motion * u - load.normal_force).norm(), 1e-9 * load.normal_force.norm());
 }
 
+TEST(RigidLoad, OfAShaftAtRestSettles) {
+  // Ten minutes after the last of two motions, 4800 semichords: slope times rho U^2 b L times the angle. A rate left over by the splines' rounding would add up.
+  const AeroelasticModel model = model_of_null(Wagner::jones);
+  const double dt = 0.002;
+  const Index samples = 400000, last = samples - 1;
+  const MotionBasis motion(samples, dt, {{{10, 40}, 1}, {{100000, 100030}, 1}});
+  const VectorXd u = VectorXd::LinSpaced(motion.unknowns(), 0.01, 0.02);
+  Conditions conditions;
+  conditions.density = 998.2;
+  conditions.speed = 0.6;
+  const RigidLoad load = rigid_load(model, conditions, theta_of(model, 5.9), motion, dt, u, {50000, last});
+  const Rig& rig = model.rig();
+  const double force = 5.9 * 998.2 * 0.6 * 0.6 * rig.semichord() * rig.strip_length * static_cast<double>(rig.submerged.size());
+  const double angle = motion_of(motion.coefficients(u), dt).angle[last];
+  EXPECT_NEAR(load.circulatory[last] / (force * angle), 1, 1e-9);
+  EXPECT_NEAR(load.normal_force[last] / (force * angle), 1, 1e-9);
+  EXPECT_NEAR(load.circulatory_by_motion.row(1).dot(u) / load.circulatory[last], 1, 1e-9);
+  EXPECT_NEAR(load.circulatory_by_motion.row(0).dot(u) / load.circulatory[50000], 1, 1e-9);
+}
+
 TEST(RigidLoad, InStillWaterIsInertiaAlone) {
   const AeroelasticModel model = model_of_null(Wagner::jones);
   const double dt = 0.002;
