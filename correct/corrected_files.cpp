@@ -30,19 +30,23 @@ void further_cells(Out out, const Row& by_source, double band, double half, doub
 std::string to_csv(const CorrectResult& r) {
   std::string text = "time [s],semichords,gauge [N],normal_force [N],normal_force_std [N],circulatory [N],circulatory_std [N],cn,cn_std";
   text += further_columns("circulatory", " [N]") + further_columns("normal_force", " [N]") + ",unexplained [N]\n";
-  auto out = std::back_inserter(text);
   const CorrectedLoad &normal = r.normal_force, &circulatory = r.circulatory;
+  fmt::memory_buffer row;
+  auto out = std::back_inserter(row);
   for (Index k = 0; k < r.gauge.size(); ++k) {
+    row.clear();
     const double t = r.start + static_cast<double>(k) * r.dt;
-    fmt::format_to(out, "{:.9g},{:.6g},", t, (t - r.onset) * r.semichords_per_second);
+    fmt::format_to(out, "{:.9g},{:.9g},", t, (t - r.onset) * r.semichords_per_second);
     if (std::isfinite(r.gauge[k])) fmt::format_to(out, "{:.6g}", r.gauge[k]);
     fmt::format_to(out, ",{:.6g},{:.4g},{:.6g},{:.4g},{:.6g},{:.4g}", normal.value[k], normal.std[k], circulatory.value[k], circulatory.std[k],
                    normal.value[k] / r.force_per_coefficient, normal.std[k] / r.force_per_coefficient);
     for (const CorrectedLoad* load : {&circulatory, &normal})
       further_cells(out, load->by_source.row(k), load->simultaneous * load->std[k], load->half_weight[k], load->twice_weight[k]);
-    text += ',';
+    row.push_back(',');
     if (std::isfinite(r.unexplained[k])) fmt::format_to(out, "{:.4g}", r.unexplained[k]);
-    text += '\n';
+    row.push_back('\n');
+    if (k == 0) text.reserve(text.size() + static_cast<std::size_t>(r.gauge.size()) * (row.size() + row.size() / 10));
+    text.append(row.data(), row.size());
   }
   return text;
 }
