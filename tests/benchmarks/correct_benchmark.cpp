@@ -1,9 +1,13 @@
-// The load of a rigid rig out of one run of 3000 samples: below 0.1 s on one core.
+// The load of a rigid rig out of one run of 3000 samples, and out of long ones: a step of 1.5 degrees within 60 ms and a rest behind it, or two of them.
 
 #include <benchmark/benchmark.h>
 
+#include <algorithm>
 #include <filesystem>
+#include <numbers>
+#include <random>
 
+#include "core/simulate.h"
 #include "core/text_file.h"
 #include "correct/correct.h"
 #include "fit/fit.h"
@@ -31,6 +35,46 @@ void correct_a_run(benchmark::State& state, const char* run) {
 BENCHMARK_CAPTURE(correct_a_run, step_a, "step_a.csv")->Unit(benchmark::kMillisecond);
 BENCHMARK_CAPTURE(correct_a_run, step_c, "step_c.csv")->Unit(benchmark::kMillisecond);
 BENCHMARK_CAPTURE(correct_a_run, heldout, "heldout.csv")->Unit(benchmark::kMillisecond);
+
+void add_noise(Eigen::VectorXd& value, double sigma, unsigned seed) {
+  std::mt19937_64 engine(seed);
+  std::normal_distribution<double> normal(0, sigma);
+  for (double& x : value) x += normal(engine);
+}
+
+/// Smooth steps up and down in turn, evenly over the record, with the noise of the sample campaign.
+Run long_run(const Rig& rig, const FittedRig& fitted, Eigen::Index samples, Eigen::Index steps) {
+  constexpr double degree = std::numbers::pi / 180, duration = 0.06;
+  Run run;
+  run.file = "long.csv";
+  run.density = 998.2;
+  run.speed = 0.6096;
+  run.dt = 0.002;
+  Eigen::VectorXd alpha = Eigen::VectorXd::Constant(samples, 2.09 * degree);
+  for (Eigen::Index i = 0; i < steps; ++i) {
+    const double start = 0.4 + run.dt * static_cast<double>(i * samples / steps);
+    for (Eigen::Index k = 0; k < samples; ++k) {
+      const double s = std::clamp((run.time(k) - start) / duration, 0.0, 1.0);
+      alpha[k] += (i % 2 == 0 ? 1.5 : -1.2) * degree * s * s * s * (10 - 15 * s + 6 * s * s);
+    }
+  }
+  run.channels.push_back({"alpha", "rad", "rad", 1, alpha});
+  const AeroelasticModel model(rig, make_basis(rig, fitted.normal_modes, fitted.torsion_modes), wagner(fitted.circulation));
+  Run simulated = simulate({model, theta_for(model, fitted, "step_a.csv"), run, PitchBetweenSamples::spline, {}, {}}).run;
+  for (Channel& channel : simulated.channels) {
+    if (channel.name == "alpha") add_noise(channel.value, 1.8e-4, 1);
+    if (channel.name == "gauge") add_noise(channel.value, 0.027, 2);
+  }
+  return simulated;
+}
+
+void correct_a_long_run(benchmark::State& state) {
+  const Rig rig = read_rig(test::null_campaign("rig.toml"));
+  const FittedRig fitted = fitted_rig(rig);
+  const CorrectProblem problem{rig, fitted, long_run(rig, fitted, state.range(0), state.range(1))};
+  for (auto _ : state) benchmark::DoNotOptimize(correct(problem).slope);
+}
+BENCHMARK(correct_a_long_run)->ArgNames({"samples", "steps"})->Args({10000, 1})->Args({100000, 1})->Args({1000000, 1})->Args({1000000, 2})->Unit(benchmark::kMillisecond);
 
 }  // namespace
 }  // namespace unrig
