@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/small_product.h"
+
 namespace unrig {
 namespace {
 
@@ -13,54 +15,68 @@ using Eigen::VectorXd;
 
 // A handful of feedbacks, so that a step allocates nothing.
 constexpr int most_feedbacks = 16;
-using FewVector = Eigen::Matrix<double, Eigen::Dynamic, 1, 0, most_feedbacks, 1>;
-using FewMatrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, most_feedbacks, most_feedbacks>;
+template <int M>
+using Few = Eigen::Matrix<double, M, 1, 0, M == Eigen::Dynamic ? most_feedbacks : M, 1>;
+template <int M>
+using FewSquare = Eigen::Matrix<double, M, M, 0, M == Eigen::Dynamic ? most_feedbacks : M, M == Eigen::Dynamic ? most_feedbacks : M>;
 
 /// The laws of all feedbacks at one sample.
-struct Forces {
-  FewVector force, slope;
-  MatrixXd partial;  // feedbacks x P
-};
-
+template <int M>
 class Laws {
  public:
-  Laws(const LinearSystem& system, const VectorXd& theta, Index parameters) : system_(system), theta_(theta) {
+  Laws(const LinearSystem& system, const VectorXd& theta) : system_(system), theta_(theta) {
     const auto count = static_cast<Index>(system.feedback.size());
-    sees.resize(count, system.states());
-    for (Index i = 0; i < count; ++i) sees.row(i) = system.feedback[static_cast<std::size_t>(i)].sees;
-    now.force = now.slope = FewVector::Zero(count);
-    now.partial = MatrixXd::Zero(count, parameters);
+    force = slope = Few<M>::Zero(count);
   }
-  const Forces& at(const FewVector& z) {
+  void at(const Few<M>& z) {
+    double partial[most_law_parameters] = {};
     for (Index i = 0; i < z.size(); ++i) {
       const Feedback& f = system_.feedback[static_cast<std::size_t>(i)];
-      double partial[8] = {};
-      now.force[i] = f.law(z[i], theta_.data() + f.first_parameter, now.slope[i], partial);
-      for (Index k = 0; k < f.parameters && now.partial.cols() > 0; ++k) now.partial(i, f.first_parameter + k) = partial[k];
+      force[i] = f.law(z[i], theta_.data() + f.first_parameter, slope[i], partial);
     }
-    return now;
   }
-  MatrixXd sees;  // feedbacks x n
-  Forces now;
+  /// d force / d theta at z, feedbacks x P.
+  void partials_at(const Few<M>& z, Eigen::Ref<MatrixXd> partials) const {
+    partials.setZero();
+    for (Index i = 0; i < z.size(); ++i) {
+      const Feedback& f = system_.feedback[static_cast<std::size_t>(i)];
+      double ignored = 0, partial[most_law_parameters] = {};
+      f.law(z[i], theta_.data() + f.first_parameter, ignored, partial);
+      for (Index k = 0; k < f.parameters; ++k) partials(i, f.first_parameter + k) = partial[k];
+    }
+  }
+  Few<M> force, slope;
 
  private:
+  static constexpr int most_law_parameters = 8;
   const LinearSystem& system_;
   const VectorXd& theta_;
 };
 
+template <int M>
+Few<M> solve_few(const FewSquare<M>& matrix, const Few<M>& right) {
+  if constexpr (M == 1)
+    return right / matrix(0, 0);
+  else
+    return matrix.partialPivLu().solve(right);
+}
+
 /// z with z = known + gain f(z): Newton's method, halved where the residual does not fall.
-FewVector implicit_argument(Laws& laws, const FewVector& known, const FewMatrix& gain, FewVector z) {
+template <int M>
+Few<M> implicit_argument(Laws<M>& laws, const Few<M>& known, const FewSquare<M>& gain, Few<M> z) {
   constexpr int most = 60;
   const Index m = z.size();
-  const auto residual_of = [&](const FewVector& at) -> FewVector { return at - known - gain * laws.at(at).force; };
-  FewVector residual = residual_of(z);
+  const auto residual_of = [&](const Few<M>& at) -> Few<M> {
+    laws.at(at);
+    return at - known - gain * laws.force;
+  };
+  Few<M> residual = residual_of(z);
   for (int i = 0; i < most; ++i) {
     const double size = residual.norm(), scale = 1e-13 * (known.norm() + z.norm()) + 1e-300;
     if (!(size > scale)) return z;
-    const FewMatrix derivative = FewMatrix::Identity(m, m) - gain * laws.now.slope.asDiagonal();
-    const FewVector step = m == 1 ? FewVector(residual / derivative(0, 0)) : FewVector(derivative.partialPivLu().solve(residual));
+    const Few<M> step = solve_few<M>(FewSquare<M>::Identity(m, m) - gain * laws.slope.asDiagonal(), residual);
     double fraction = 1;
-    FewVector next = z - step, after = residual_of(next);
+    Few<M> next = z - step, after = residual_of(next);
     while (!(after.norm() < size) && fraction > 1e-4) {
       fraction /= 2;
       next = z - fraction * step;
@@ -75,104 +91,210 @@ FewVector implicit_argument(Laws& laws, const FewVector& known, const FewMatrix&
   return z;
 }
 
-}  // namespace
+/// All that one sample step does linearly, as one matrix from v = [x; f; jerk; u now; u next] to [x without the force at the end of the step; what the laws see
+/// of that; outputs now]. The rows are padded for small_product.
+struct StepMatrices {
+  Index states, feedbacks, channels, measured, parameters;
+  MatrixXd step;     // rows x inputs
+  MatrixXd late;     // rows x feedbacks: what the force at the end of the step adds
+  MatrixXd partial;  // (rows P) x inputs, parameter by parameter
+  MatrixXd late_partial;
 
-NonlinearResponse follow(const LinearSystem& system, const ExactStep& step, const VectorXd& theta, const NonlinearDrive& drive, Index samples,
-                         Partials partials) {
-  const Index n = system.states(), channels = system.C.rows(), m = static_cast<Index>(system.feedback.size()), measured = system.B.cols() - m;
-  const Index parameters = partials == Partials::all ? system.A.parameters() : 0, directions = drive.start_tangent.cols(), columns = directions + parameters;
-  const MatrixXd early = step.input0.value.rightCols(m), late = step.input1.value.rightCols(m), direct = system.D.value.rightCols(m);
-  Laws laws(system, theta, parameters);
-  const FewMatrix gain = laws.sees * late;  // how the force at the end of a step moves what the laws see there
+  Index rows() const { return step.rows(); }
+  Index inputs() const { return step.cols(); }
+  Index force() const { return states; }
+  Index jerk() const { return states + feedbacks; }
+  Index input() const { return jerk() + 1; }
+  Index output() const { return states + feedbacks; }
 
-  const auto partial_of = [&](const DualMatrix& a, Index j) -> const MatrixXd* { return a.depends_on(j) ? &a.d(j) : nullptr; };
-
-  NonlinearResponse response;
-  response.output.resize(samples, channels);
-  response.tangent.assign(static_cast<std::size_t>(columns > 0 ? channels : 0), MatrixXd(samples, columns));
-  VectorXd x = drive.start, free(n), y(channels);
-  FewVector z = laws.sees * x;
-  MatrixXd tangent = MatrixXd::Zero(n, columns), next(n, columns), force_tangent(m, columns), outputs(channels, columns);
-  if (directions > 0) tangent.leftCols(directions) = drive.start_tangent;
-  if (parameters > 0 && drive.start_partial.size() > 0) tangent.rightCols(parameters) = drive.start_partial;
-
-  laws.at(z);
-  Forces f = laws.now;
-  force_tangent.noalias() = f.slope.asDiagonal() * (laws.sees * tangent);
-  force_tangent.rightCols(parameters) += f.partial;
-  VectorXd known_input = VectorXd::Zero(measured), next_input = known_input;
-  FewVector product = FewVector::Zero(m), square = product, largest = product;
-  for (Index k = 0; k < samples; ++k) {
-    if (measured > 0) known_input = drive.input.row(k).transpose(), next_input = drive.input.row(k + 1).transpose();
-    // Outputs now.
-    y.noalias() = system.C.value * x;
-    y.noalias() += direct * f.force;
-    if (measured > 0) y.noalias() += system.D.value.leftCols(measured) * known_input;
-    response.output.row(k) = y.transpose();
-    if (columns > 0) {
-      outputs.noalias() = system.C.value * tangent;
-      outputs.noalias() += direct * force_tangent;
-      for (Index j = 0; j < parameters; ++j) {
-        if (const MatrixXd* d = partial_of(system.C, j)) outputs.col(directions + j).noalias() += *d * x;
-        if (const MatrixXd* d = partial_of(system.D, j)) {
-          outputs.col(directions + j).noalias() += d->rightCols(m) * f.force;
-          if (measured > 0) outputs.col(directions + j).noalias() += d->leftCols(measured) * known_input;
-        }
-      }
-      for (Index c = 0; c < channels; ++c) response.tangent[static_cast<std::size_t>(c)].row(k) = outputs.row(c);
-    }
-    // One step, without the force at its end; then that.
-    free.noalias() = step.transition.value * x;
-    free.noalias() += early * f.force;
-    if (drive.jerk.size() > 0) free += drive.jerk[k] * step.jerk.value.col(0);
-    if (measured > 0) {
-      free.noalias() += step.input0.value.leftCols(measured) * known_input;
-      free.noalias() += step.input1.value.leftCols(measured) * next_input;
-    }
-    if (columns > 0) {
-      next.noalias() = step.transition.value * tangent;
-      next.noalias() += early * force_tangent;
-      if (drive.jerk_tangent.size() > 0 && !drive.jerk_tangent.row(k).isZero(0)) next.leftCols(directions).noalias() += step.jerk.value.col(0) * drive.jerk_tangent.row(k);
-      for (Index j = 0; j < parameters; ++j) {
-        auto column = next.col(directions + j);
-        if (const MatrixXd* d = partial_of(step.transition, j)) column.noalias() += *d * x;
-        if (drive.jerk.size() > 0)
-          if (const MatrixXd* d = partial_of(step.jerk, j)) column += drive.jerk[k] * d->col(0);
-        if (const MatrixXd* d = partial_of(step.input0, j)) {
-          column.noalias() += d->rightCols(m) * f.force;
-          if (measured > 0) column.noalias() += d->leftCols(measured) * known_input;
-        }
-        if (measured > 0)
-          if (const MatrixXd* d = partial_of(step.input1, j)) column.noalias() += d->leftCols(measured) * next_input;
-      }
-    }
-    z = implicit_argument(laws, laws.sees * free, gain, z);
-    f = laws.now;
-    x = free;
-    x.noalias() += late * f.force;
-    for (Index i = 0; i < m; ++i) product[i] += f.force[i] * z[i], square[i] += z[i] * z[i], largest[i] = std::max(largest[i], std::abs(z[i]));
-    if (columns > 0) {
-      // dx = dfree + late df + dlate f, df = slope sees dx + partial.
-      for (Index j = 0; j < parameters; ++j)
-        if (const MatrixXd* d = partial_of(step.input1, j)) next.col(directions + j).noalias() += d->rightCols(m) * f.force;
-      next.rightCols(parameters).noalias() += late * f.partial;
-      const FewMatrix derivative = FewMatrix::Identity(m, m) - gain * f.slope.asDiagonal();
-      const MatrixXd seen = derivative.partialPivLu().solve(laws.sees * next);
-      force_tangent.noalias() = f.slope.asDiagonal() * seen;
-      next.noalias() += late * force_tangent;
-      force_tangent.rightCols(parameters) += f.partial;
-      tangent.swap(next);
-    }
-    if (!x.allFinite()) {
-      response.finite = false;
-      break;
+  StepMatrices(const LinearSystem& system, const ExactStep& exact, const MatrixXd& sees, Index parameter_count)
+      : states(system.states()), feedbacks(sees.rows()), channels(system.C.rows()), measured(system.B.cols() - feedbacks), parameters(parameter_count) {
+    const auto value = [](const DualMatrix& m) { return &m.value; };
+    fill(system, exact, sees, value, step, late);
+    partial.resize(parameters * rows(), inputs());
+    late_partial.resize(parameters * rows(), feedbacks);
+    MatrixXd d_step, d_late;
+    for (Index j = 0; j < parameters; ++j) {
+      fill(system, exact, sees, [j](const DualMatrix& m) { return m.depends_on(j) ? &m.d(j) : nullptr; }, d_step, d_late);
+      partial.middleRows(j * rows(), rows()) = d_step;
+      late_partial.middleRows(j * rows(), rows()) = d_late;
     }
   }
-  response.equivalent_slope = (square.array() > 0).select(product.array() / square.array().max(1e-300), 0.0);
-  response.largest_argument = largest;
-  response.end = x;
-  response.end_tangent = tangent;
-  return response;
+
+ private:
+  template <typename Part>
+  void fill(const LinearSystem& system, const ExactStep& exact, const MatrixXd& sees, Part part, MatrixXd& all, MatrixXd& at_end) const {
+    all = MatrixXd::Zero(padded_rows(states + feedbacks + channels), states + feedbacks + 1 + 2 * measured);
+    at_end = MatrixXd::Zero(all.rows(), feedbacks);
+    if (const MatrixXd* m = part(exact.transition)) all.topLeftCorner(states, states) = *m;
+    if (const MatrixXd* m = part(exact.input0)) {
+      all.block(0, force(), states, feedbacks) = m->rightCols(feedbacks);
+      all.block(0, input(), states, measured) = m->leftCols(measured);
+    }
+    if (const MatrixXd* m = part(exact.input1)) {
+      at_end.topRows(states) = m->rightCols(feedbacks);
+      all.block(0, input() + measured, states, measured) = m->leftCols(measured);
+    }
+    if (exact.jerk.value.size() > 0)
+      if (const MatrixXd* m = part(exact.jerk)) all.col(jerk()).head(states) = m->col(0);
+    all.middleRows(states, feedbacks) = sees * all.topRows(states);
+    at_end.middleRows(states, feedbacks) = sees * at_end.topRows(states);
+    if (const MatrixXd* m = part(system.C)) all.block(output(), 0, channels, states) = *m;
+    if (const MatrixXd* m = part(system.D)) {
+      all.block(output(), force(), channels, feedbacks) = m->rightCols(feedbacks);
+      all.block(output(), input(), channels, measured) = m->leftCols(measured);
+    }
+  }
+};
+
+template <int M>
+class Follower {
+ public:
+  Follower(const LinearSystem& system, const ExactStep& exact, const VectorXd& theta, const NonlinearDrive& drive, Index samples, Partials partials)
+      : drive_(drive),
+        samples_(samples),
+        laws_(system, theta),
+        sees_(rows_seen(system)),
+        one_(system, exact, sees_, partials == Partials::all ? system.A.parameters() : 0),
+        directions_(drive.start_tangent.cols()),
+        columns_(directions_ + one_.parameters),
+        gain_(one_.late.middleRows(one_.force(), one_.feedbacks)) {}
+
+  NonlinearResponse run() {
+    begin();
+    for (Index first = 0; first < samples_ && response_.finite; first += most_at_a_time) {
+      const Index count = std::min(most_at_a_time, samples_ - first);
+      march(first, count);
+      if (columns_ > 0 && response_.finite) carry_tangents(first, count);
+      now_.col(0) = now_.col(count);
+      slope_.col(0) = slope_.col(count);
+    }
+    response_.equivalent_slope = (square_.array() > 0).select(product_.array() / square_.array().max(1e-300), 0.0);
+    response_.largest_argument = largest_;
+    response_.end = now_.col(0).head(one_.states);
+    response_.end_tangent = tangent_.topRows(one_.states);
+    return std::move(response_);
+  }
+
+ private:
+  static constexpr Index most_at_a_time = 256;
+
+  static MatrixXd rows_seen(const LinearSystem& system) {
+    MatrixXd sees(static_cast<Index>(system.feedback.size()), system.states());
+    for (Index i = 0; i < sees.rows(); ++i) sees.row(i) = system.feedback[static_cast<std::size_t>(i)].sees;
+    return sees;
+  }
+
+  void begin() {
+    const Index n = one_.states, m = one_.feedbacks, block = std::min(most_at_a_time, samples_);
+    response_.output.resize(samples_, one_.channels);
+    response_.tangent.assign(static_cast<std::size_t>(columns_ > 0 ? one_.channels : 0), MatrixXd(samples_, columns_));
+    now_ = MatrixXd::Zero(one_.inputs(), block + 1);
+    slope_ = MatrixXd::Zero(m, block + 1);
+    stepped_ = VectorXd::Zero(one_.rows());
+    z_ = sees_ * drive_.start;
+    laws_.at(z_);
+    now_.col(0).head(n) = drive_.start;
+    now_.col(0).segment(one_.force(), m) = laws_.force;
+    slope_.col(0) = laws_.slope;
+    law_partial_ = MatrixXd::Zero(m, one_.parameters * (block + 1));
+    if (one_.parameters > 0) laws_.partials_at(z_, law_partials(0));
+    product_ = square_ = largest_ = VectorXd::Zero(m);
+    tangent_ = next_ = MatrixXd::Zero(std::max(one_.rows(), one_.input()), columns_);
+    if (directions_ > 0) tangent_.topLeftCorner(n, directions_) = drive_.start_tangent;
+    if (one_.parameters > 0 && drive_.start_partial.size() > 0) tangent_.topRightCorner(n, one_.parameters) = drive_.start_partial;
+    tangent_.middleRows(one_.force(), m) = slope_.col(0).asDiagonal() * (sees_ * tangent_.topRows(n));
+    tangent_.block(one_.force(), directions_, m, one_.parameters) += law_partials(0);
+  }
+
+  auto law_partials(Index k) { return law_partial_.middleCols(k * one_.parameters, one_.parameters); }
+
+  /// The response itself; leaves v of every sample in now_, the laws' slopes in slope_.
+  void march(Index first, Index count) {
+    const Index n = one_.states, m = one_.feedbacks, q = one_.measured;
+    for (Index k = 0; k < count; ++k) {
+      auto v = now_.col(k), next = now_.col(k + 1);
+      v[one_.jerk()] = drive_.jerk.size() > 0 ? drive_.jerk[first + k] : 0;
+      for (Index i = 0; i < q; ++i) {
+        v[one_.input() + i] = drive_.input(first + k, i);
+        v[one_.input() + q + i] = drive_.input(first + k + 1, i);
+      }
+      small_product(one_.step.data(), one_.rows(), one_.inputs(), v.data(), 0, 1, stepped_.data(), 0);
+      response_.output.row(first + k) = stepped_.segment(one_.output(), one_.channels).transpose();
+      z_ = implicit_argument<M>(laws_, stepped_.segment(n, m), gain_, z_);
+      next.head(n) = stepped_.head(n);
+      for (Index i = 0; i < m; ++i) {
+        const double force = laws_.force[i], z = z_[i];
+        next.head(n) += force * one_.late.col(i).head(n);
+        next[one_.force() + i] = force;
+        product_[i] += force * z, square_[i] += z * z, largest_[i] = std::max(largest_[i], std::abs(z));
+      }
+      slope_.col(k + 1) = laws_.slope;
+      if (one_.parameters > 0) laws_.partials_at(z_, law_partials(k + 1));
+      if (!next.head(n).allFinite()) {
+        response_.finite = false;
+        return;
+      }
+    }
+  }
+
+  /// The tangents over the same samples: dx' = step dv + dstep v + late df + dlate f, df = slope dz + partial, where dz is solved for.
+  void carry_tangents(Index first, Index count) {
+    const Index m = one_.feedbacks, p = one_.parameters, rows = one_.rows();
+    if (p > 0) {
+      source_.noalias() = one_.partial * now_.leftCols(count);
+      source_.noalias() += one_.late_partial * now_.block(one_.force(), 1, m, count);
+    }
+    for (Index k = 0; k < count; ++k) {
+      if (drive_.jerk_tangent.size() > 0) tangent_.row(one_.jerk()).head(directions_) = drive_.jerk_tangent.row(first + k);
+      small_product(one_.step.data(), rows, one_.input(), tangent_.data(), tangent_.rows(), columns_, next_.data(), next_.rows());
+      auto by_parameter = next_.rightCols(p);
+      for (Index j = 0; j < p; ++j) by_parameter.col(j).head(rows) += source_.col(k).segment(j * rows, rows);
+      for (Index c = 0; c < one_.channels; ++c) response_.tangent[static_cast<std::size_t>(c)].row(first + k) = next_.row(one_.output() + c);
+      if (p > 0) by_parameter.topRows(rows) += one_.late.lazyProduct(law_partials(k + 1));
+      feed_back(slope_.col(k + 1));
+      if (p > 0) by_parameter.middleRows(one_.force(), m) += law_partials(k + 1);
+      next_.row(one_.jerk()).setZero();
+      tangent_.swap(next_);
+    }
+  }
+
+  /// Puts the change of the force where that of its argument stands, and adds what it does to the state.
+  void feed_back(const Few<M>& slope) {
+    const Index n = one_.states, m = one_.feedbacks;
+    const FewSquare<M> answer = slope.asDiagonal() * inverse(FewSquare<M>::Identity(m, m) - gain_ * slope.asDiagonal());
+    for (Index j = 0; j < columns_; ++j) {
+      const Few<M> force = answer.lazyProduct(next_.col(j).segment(n, m));
+      for (Index i = 0; i < m; ++i) next_.col(j).head(n) += force[i] * one_.late.col(i).head(n);
+      next_.col(j).segment(one_.force(), m) = force;
+    }
+  }
+
+  static FewSquare<M> inverse(const FewSquare<M>& matrix) {
+    if constexpr (M == 1)
+      return matrix.cwiseInverse();
+    else
+      return matrix.partialPivLu().inverse();
+  }
+
+  const NonlinearDrive& drive_;
+  Index samples_;
+  Laws<M> laws_;
+  MatrixXd sees_;  // feedbacks x n
+  StepMatrices one_;
+  Index directions_, columns_;
+  FewSquare<M> gain_;  // how the force at the end of a step moves what the laws see there
+  NonlinearResponse response_;
+  MatrixXd now_, slope_, law_partial_, source_, tangent_, next_;
+  VectorXd stepped_, product_, square_, largest_;
+  Few<M> z_;
+};
+
+}  // namespace
+
+NonlinearResponse follow(const LinearSystem& system, const ExactStep& step, const VectorXd& theta, const NonlinearDrive& drive, Index samples, Partials partials) {
+  if (system.feedback.size() == 1) return Follower<1>(system, step, theta, drive, samples, partials).run();
+  return Follower<Eigen::Dynamic>(system, step, theta, drive, samples, partials).run();
 }
 
 }  // namespace unrig
