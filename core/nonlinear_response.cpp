@@ -147,12 +147,20 @@ struct StepMatrices {
   }
 };
 
+Index steps_per_sample(const LinearSystem& system) {
+  Index most = 1;
+  for (const Feedback& f : system.feedback) most = std::max(most, f.steps_per_sample);
+  return most;
+}
+
 template <int M>
 class Follower {
  public:
   Follower(const LinearSystem& system, const ExactStep& exact, const VectorXd& theta, const NonlinearDrive& drive, Index samples, Partials partials)
       : drive_(drive),
+        per_sample_(steps_per_sample(system)),
         samples_(samples),
+        steps_(samples * per_sample_),
         laws_(system, theta),
         sees_(rows_seen(system)),
         one_(system, exact, sees_, partials == Partials::all ? system.A.parameters() : 0),
@@ -162,8 +170,8 @@ class Follower {
 
   NonlinearResponse run() {
     begin();
-    for (Index first = 0; first < samples_ && response_.finite; first += most_at_a_time) {
-      const Index count = std::min(most_at_a_time, samples_ - first);
+    for (Index first = 0; first < steps_ && response_.finite; first += most_at_a_time) {
+      const Index count = std::min(most_at_a_time, steps_ - first);
       march(first, count);
       if (columns_ > 0 && response_.finite) carry_tangents(first, count);
       now_.col(0) = now_.col(count);
@@ -186,7 +194,7 @@ class Follower {
   }
 
   void begin() {
-    const Index n = one_.states, m = one_.feedbacks, block = std::min(most_at_a_time, samples_);
+    const Index n = one_.states, m = one_.feedbacks, block = std::min(most_at_a_time, steps_);
     response_.output.resize(samples_, one_.channels);
     response_.tangent.assign(static_cast<std::size_t>(columns_ > 0 ? one_.channels : 0), MatrixXd(samples_, columns_));
     now_ = MatrixXd::Zero(one_.inputs(), block + 1);
@@ -214,13 +222,15 @@ class Follower {
     const Index n = one_.states, m = one_.feedbacks, q = one_.measured;
     for (Index k = 0; k < count; ++k) {
       auto v = now_.col(k), next = now_.col(k + 1);
-      v[one_.jerk()] = drive_.jerk.size() > 0 ? drive_.jerk[first + k] : 0;
+      const Index sample = (first + k) / per_sample_, part = (first + k) % per_sample_;
+      v[one_.jerk()] = drive_.jerk.size() > 0 ? drive_.jerk[sample] : 0;
       for (Index i = 0; i < q; ++i) {
-        v[one_.input() + i] = drive_.input(first + k, i);
-        v[one_.input() + q + i] = drive_.input(first + k + 1, i);
+        const double per_step = (drive_.input(sample + 1, i) - drive_.input(sample, i)) / static_cast<double>(per_sample_);
+        v[one_.input() + i] = drive_.input(sample, i) + static_cast<double>(part) * per_step;
+        v[one_.input() + q + i] = v[one_.input() + i] + per_step;
       }
       small_product(one_.step.data(), one_.rows(), one_.inputs(), v.data(), 0, 1, stepped_.data(), 0);
-      response_.output.row(first + k) = stepped_.segment(one_.output(), one_.channels).transpose();
+      if (part == 0) response_.output.row(sample) = stepped_.segment(one_.output(), one_.channels).transpose();
       z_ = implicit_argument<M>(laws_, stepped_.segment(n, m), gain_, z_);
       next.head(n) = stepped_.head(n);
       for (Index i = 0; i < m; ++i) {
@@ -246,11 +256,13 @@ class Follower {
       source_.noalias() += one_.late_partial * now_.block(one_.force(), 1, m, count);
     }
     for (Index k = 0; k < count; ++k) {
-      if (drive_.jerk_tangent.size() > 0) tangent_.row(one_.jerk()).head(directions_) = drive_.jerk_tangent.row(first + k);
+      const Index sample = (first + k) / per_sample_;
+      const bool reads = (first + k) % per_sample_ == 0;
+      if (drive_.jerk_tangent.size() > 0) tangent_.row(one_.jerk()).head(directions_) = drive_.jerk_tangent.row(sample);
       small_product(one_.step.data(), rows, one_.input(), tangent_.data(), tangent_.rows(), columns_, next_.data(), next_.rows());
       auto by_parameter = next_.rightCols(p);
       for (Index j = 0; j < p; ++j) by_parameter.col(j).head(rows) += source_.col(k).segment(j * rows, rows);
-      for (Index c = 0; c < one_.channels; ++c) response_.tangent[static_cast<std::size_t>(c)].row(first + k) = next_.row(one_.output() + c);
+      for (Index c = 0; c < one_.channels && reads; ++c) response_.tangent[static_cast<std::size_t>(c)].row(sample) = next_.row(one_.output() + c);
       if (p > 0) by_parameter.topRows(rows) += one_.late.lazyProduct(law_partials(k + 1));
       feed_back(slope_.col(k + 1));
       if (p > 0) by_parameter.middleRows(one_.force(), m) += law_partials(k + 1);
@@ -278,7 +290,7 @@ class Follower {
   }
 
   const NonlinearDrive& drive_;
-  Index samples_;
+  Index per_sample_, samples_, steps_;
   Laws<M> laws_;
   MatrixXd sees_;  // feedbacks x n
   StepMatrices one_;
@@ -291,6 +303,8 @@ class Follower {
 };
 
 }  // namespace
+
+ExactStep step_to_follow(const LinearSystem& system, double dt) { return exact_step(system, dt / static_cast<double>(steps_per_sample(system))); }
 
 NonlinearResponse follow(const LinearSystem& system, const ExactStep& step, const VectorXd& theta, const NonlinearDrive& drive, Index samples, Partials partials) {
   if (system.feedback.size() == 1) return Follower<1>(system, step, theta, drive, samples, partials).run();

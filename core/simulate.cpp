@@ -145,7 +145,7 @@ MatrixXd response_of(const SimulateProblem& problem, const LinearSystem& system,
   const Motion motion = system.motion >= 0 && !jumps ? interpolated_motion(run.channel("alpha").value, run.dt) : Motion{};
   const MatrixXd input = inputs_of(run, conditions);
   const VectorXd start = start_of(problem, system, motion);
-  const ExactStep step = exact_step(system, run.dt);
+  const ExactStep step = step_to_follow(system, run.dt);
   if (!system.feedback.empty()) {
     const NonlinearResponse response = follow(system, step, problem.theta, {start, motion.jerk, input, MatrixXd(system.states(), 0), {}}, run.samples(), Partials::none);
     if (!response.finite) throw NoAnswer(run.file + ": the response with its nonlinear effects grows beyond all bounds");

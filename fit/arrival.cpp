@@ -103,6 +103,10 @@ Arrival grow(Arrival start, const FitProblem& problem, const ArrivalEffort& effo
   return other.reduced_chi2() < arrival.reduced_chi2() ? other : arrival;
 }
 
+bool belongs_to_an_effect(const std::string& parameter) {
+  return std::any_of(effects().begin(), effects().end(), [&](const Effect& e) { return parameter.starts_with(e.id + "."); });
+}
+
 void set_starts(JointProblem& joint, const std::map<std::string, double>& starts) {
   for (Unknown& u : joint.unknowns())
     if (const auto found = starts.find(joint.parameter(u).name); found != starts.end()) u.value = found->second;
@@ -292,7 +296,7 @@ Arrival extend(const FitProblem& problem, const Arrival& without, const std::sha
 Arrival arrive_with_effects(const FitProblem& problem, const Arrival& like, const ArrivalEffort& effort) {
   std::map<std::string, double> starts = problem.start;
   for (const Unknown& u : like.joint.unknowns())
-    if (const std::string& name = like.joint.parameter(u).name; name.find('-') != std::string::npos) starts.emplace(name, u.value);  // only effects have a dash
+    if (const std::string& name = like.joint.parameter(u).name; belongs_to_an_effect(name)) starts.emplace(name, u.value);
   Arrival arrival = grow(first_guess(problem, like.model, like.windows, starts), problem, effort);
   hold_undetermined(arrival.joint);
   return arrival;

@@ -19,6 +19,15 @@ double prior_width(double value) { return std::max(0.5 * std::abs(value), 0.05);
 
 }  // namespace
 
+ResidualTerm weak_prior(std::size_t index, const LeastSquaresUnknown& u) {
+  const double centre = std::clamp(u.value, u.lower, u.upper), width = prior_width(centre);
+  return {{index}, 1, [centre, width](const VectorXd& value, VectorXd& residual, MatrixXd* jacobian) {
+            residual[0] = (value[0] - centre) / width;
+            if (jacobian != nullptr) (*jacobian)(0, 0) = 1 / width;
+            return true;
+          }};
+}
+
 JointProblem::JointProblem(const AeroelasticModel& model, std::vector<RunResidual> runs) : model_(&model), runs_(std::move(runs)) {
   const auto& parameters = model.parameters();
   for (std::size_t j = 0; j < parameters.size(); ++j)
@@ -79,14 +88,7 @@ LeastSquaresProblem JointProblem::least_squares() const {
 JointProblem::Summary JointProblem::solve(const SolveOptions& options) {
   LeastSquaresProblem problem = least_squares();
   for (std::size_t i = 0; options.prior && i < unknowns_.size(); ++i) {
-    if (unknowns_[i].held) continue;
-    const LeastSquaresUnknown& u = problem.unknowns[i];
-    const double centre = std::clamp(u.value, u.lower, u.upper), width = prior_width(centre);
-    problem.terms.push_back({{i}, 1, [centre, width](const VectorXd& value, VectorXd& residual, MatrixXd* jacobian) {
-                               residual[0] = (value[0] - centre) / width;
-                               if (jacobian != nullptr) (*jacobian)(0, 0) = 1 / width;
-                               return true;
-                             }});
+    if (!unknowns_[i].held) problem.terms.push_back(weak_prior(i, problem.unknowns[i]));
   }
   // Held unknowns need no derivatives during the search.
   std::vector<Index> free;

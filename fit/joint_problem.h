@@ -18,6 +18,9 @@ struct Unknown {
   std::string why_held;  ///< for the person who reads the report
 };
 
+/// Holds unknown `index` weakly near its present value, while the data determine only some of them.
+ResidualTerm weak_prior(std::size_t index, const LeastSquaresUnknown& unknown);
+
 /// Several runs of one rig, and the unknowns they share.
 class JointProblem {
  public:

@@ -1,6 +1,7 @@
 #pragma once
 #include <Eigen/QR>
 #include <algorithm>
+#include <cmath>
 #include <memory>
 #include <utility>
 #include <vector>
@@ -134,6 +135,18 @@ class Block {
   std::vector<Rotation> rotations_;  // per stretch, or of the whole motion; none where the rows are few already
   Rotation joint_;                   // of what several stretches keep
 };
+
+/// Marquardt's (1963) step: s with least |R (s - full)|^2 + damping |D s|^2, D the lengths of R's columns.
+inline Eigen::VectorXd damped_step(const Eigen::MatrixXd& factor, const Eigen::VectorXd& full, double damping) {
+  const Eigen::Index n = factor.cols();
+  Eigen::MatrixXd rows(factor.rows() + n, n);
+  rows.topRows(factor.rows()) = factor;
+  rows.bottomRows(n) = (std::sqrt(damping) * factor.colwise().norm()).asDiagonal();
+  Eigen::VectorXd target = Eigen::VectorXd::Zero(rows.rows());
+  target.head(factor.rows()) = factor * full;
+  const Eliminator damped(rows);
+  return damped.solve(damped.rotated(target));
+}
 
 }  // namespace run_rows
 

@@ -140,9 +140,11 @@ std::shared_ptr<RunResidual::Linearised> RunResidual::equivalent_linear(const Li
   return plain;
 }
 
+/// Standard errors widen with what is left.
 bool RunResidual::worth_going_on(double promised, double chi2) const {
   constexpr double rounding = 1e-9;
-  return promised > linear_precision_ * linear_precision_ + rounding * chi2;
+  const double left = std::max(1.0, chi2 / static_cast<double>(std::max<Index>(1, degrees_of_freedom())));
+  return promised > linear_precision_ * linear_precision_ * left + rounding * chi2;
 }
 
 /// c that the last slopes lead to from where they were taken, else that of the last solution or, where there is none, of the linear part alone.
@@ -158,7 +160,26 @@ RunResidual::NonlinearPoint RunResidual::first_nonlinear_point(const Linearised&
   }
   if (last_linear_.size() > 0) consider(last_linear_);
   if (!std::isfinite(best.chi2)) consider(equivalent_linear(lin, VectorXd::Zero(static_cast<Index>(lin.system.feedback.size())))->linear);
+  constexpr double followed = 2;
+  if (motion_.unknowns() == 0 && best.chi2 > followed * static_cast<double>(degrees_of_freedom()))
+    if (NonlinearPoint grown = along_growing_record(lin, theta, best); grown.chi2 < best.chi2) return grown;
   return best;
+}
+
+/// c of a free decay, searched over a part of the record that grows from where any start will do.
+RunResidual::NonlinearPoint RunResidual::along_growing_record(const Linearised& lin, const VectorXd& theta, NonlinearPoint point) const {
+  constexpr double growth = 1.3;
+  RunResidual part = *this;
+  Linearised part_lin;
+  part_lin.system = lin.system;
+  part_lin.step = lin.step;
+  for (part.last_sample_ = std::min(last_sample_, 2 * unknowns_); part.last_sample_ < last_sample_;) {
+    part.search_along_tangents(part_lin, theta, part.nonlinear_point(lin, theta, point.linear));
+    if (!std::isfinite(part_lin.chi2)) return point;
+    point.linear = part_lin.linear;
+    part.last_sample_ = std::min(last_sample_, static_cast<Index>(growth * static_cast<double>(part.last_sample_)) + 1);
+  }
+  return nonlinear_point(lin, theta, point.linear);
 }
 
 void RunResidual::solve_nonlinear(Linearised& lin, const VectorXd& theta) const {
@@ -172,10 +193,12 @@ void RunResidual::solve_nonlinear(Linearised& lin, const VectorXd& theta) const 
   if (std::isfinite(lin.chi2)) last_linear_ = lin.linear;
 }
 
-/// Gauss-Newton steps in c, halved where chi-square does not fall.
+/// Levenberg-Marquardt steps in c: a full Gauss-Newton step where chi-square falls by it, else the more damped the longer it does not.
 void RunResidual::search_along_tangents(Linearised& lin, const VectorXd& theta, NonlinearPoint point) const {
   // From where the equivalent linear system led, exact tangents arrive in a few steps, or the law has kinks and the next search in theta comes by again.
   const int most = motion_.unknowns() > 0 ? 8 : 30;
+  constexpr double least_damping = 1e-4, most_damping = 1e4, growth = 10;
+  double damping = 0;
   for (int i = 0; i < most; ++i) {
     if (!stack_nonlinear_rows(lin, theta, point.linear)) {
       lin.chi2 = INFINITY;
@@ -186,13 +209,17 @@ void RunResidual::search_along_tangents(Linearised& lin, const VectorXd& theta, 
     lin.linear = point.linear;
     lin.chi2 = point.chi2;
     if (!worth_going_on(promised, point.chi2)) return;
-    double fraction = 1;
-    NonlinearPoint next = nonlinear_point(lin, theta, point.linear + step);
-    while (!(next.chi2 < point.chi2) && fraction > 1e-3) {
-      fraction /= 2;
-      next = nonlinear_point(lin, theta, point.linear + fraction * step);
+    const auto damped = [&] { return damping > 0 ? run_rows::damped_step(lin.eliminate->factor(), step, damping) : step; };
+    NonlinearPoint next = nonlinear_point(lin, theta, point.linear + damped());
+    while (!(next.chi2 < point.chi2) && damping < most_damping) {
+      damping = std::max(least_damping, growth * damping);
+      next = nonlinear_point(lin, theta, point.linear + damped());
     }
     if (!(next.chi2 < point.chi2)) return;
+    const double gained = point.chi2 - next.chi2;
+    const bool creeps = gained < 0.01 * promised && gained < 1e-3 * point.chi2;
+    if (creeps) return;
+    damping = damping > least_damping ? damping / growth : 0;
     point = std::move(next);
   }
 }
@@ -238,7 +265,7 @@ void RunResidual::search_along_equivalent(Linearised& lin, const VectorXd& theta
 }
 
 void RunResidual::follow_nonlinear_partials(const LinearSystem& system, const VectorXd& theta, const VectorXd& linear, const TakeRows& take) const {
-  const ExactStep step = exact_step(system, run_->dt);
+  const ExactStep step = step_to_follow(system, run_->dt);
   const auto parameters = static_cast<Index>(model_->parameters().size());
   const VectorXd jerk = whole_jerk(linear);
   NonlinearDrive from{initial_state(linear, system.states()), {}, {}, MatrixXd(system.states(), 0), {}};
@@ -257,6 +284,41 @@ void RunResidual::follow_nonlinear_partials(const LinearSystem& system, const Ve
     from.start = response.end;
     from.start_partial = response.end_tangent;
   }
+}
+
+RunResidual::SideBySide RunResidual::side_by_side(const VectorXd& theta, const VectorXd& linear, Index samples, Partials partials) const {
+  samples = std::min(samples, last_sample_);
+  const bool slopes = partials == Partials::all;
+  LinearSystem system = slopes ? differentiable_system(theta) : model_->system(conditions_, theta, channels_);
+  if (!slopes)
+    for (DualMatrix* m : {&system.A, &system.B, &system.C, &system.D}) m->partial.clear();
+  const Index n = system.states(), states = static_cast<Index>(free_.size()), channels = measured_.cols(), parameters = static_cast<Index>(model_->parameters().size());
+  NonlinearDrive from{initial_state(linear, n), {}, inputs_, MatrixXd::Zero(n, slopes ? states : 0), {}};
+  for (Index i = 0; i < from.start_tangent.cols(); ++i) from.start_tangent(free_[static_cast<std::size_t>(i)], i) = 1;
+  const NonlinearResponse response = follow(system, step_to_follow(system, run_->dt), theta, from, samples, partials);
+  SideBySide result;
+  result.chi2 = INFINITY;
+  if (!response.finite) return result;
+  MatrixXd left = measured_.topRows(samples) - response.output;
+  left.rowwise() -= linear.segment(first_offset_, channels).transpose();
+  left.array() *= weight_.topRows(samples).array();
+  result.chi2 = left.squaredNorm();
+  if (!slopes) return result;
+  MatrixXd rows = MatrixXd::Zero(channels * samples, parameters + unknowns_ + 1);
+  for (Index c = 0; c < channels; ++c) {
+    auto of_channel = rows.middleRows(c * samples, samples);
+    const auto w = weight_.col(c).head(samples);
+    const MatrixXd& tangent = response.tangent[static_cast<std::size_t>(c)];
+    of_channel.leftCols(parameters) = -(w.asDiagonal() * tangent.rightCols(parameters));
+    of_channel.middleCols(parameters + first_state_, states) = -(w.asDiagonal() * tangent.leftCols(states));
+    of_channel.col(parameters + first_offset_ + c) = -w;
+    of_channel.col(parameters + unknowns_) = left.col(c);
+  }
+  rows = run_rows::compress(std::move(rows));
+  result.in_theta = rows.leftCols(parameters);
+  result.in_c = rows.middleCols(parameters, unknowns_);
+  result.residual = rows.col(parameters + unknowns_);
+  return result;
 }
 
 }  // namespace unrig

@@ -67,6 +67,15 @@ class RunResidual {
   Solution solve(const Eigen::VectorXd& theta) const;
   Evaluation differentiate(const Solution& solution) const;
 
+  /// The first `samples` of the weighted residual measured - predicted at any theta and c, for searches that do not eliminate c; of runs whose motion is not
+  /// estimated. Residual and slopes are compressed to P + (unknowns) + 1 rows at most with the same inner products; empty for Partials::none.
+  struct SideBySide {
+    double chi2 = 0;
+    Eigen::VectorXd residual;
+    Eigen::MatrixXd in_theta, in_c;  ///< its slopes; rows x P, rows x unknowns
+  };
+  SideBySide side_by_side(const Eigen::VectorXd& theta, const Eigen::VectorXd& linear, Eigen::Index samples, Partials partials) const;
+
   /// The fitted channels over the whole record, at theta and the c that belongs to it.
   struct Prediction {
     std::vector<std::string> channels;
@@ -128,6 +137,8 @@ class RunResidual {
     if (other.last_linear_.size() == unknowns_) last_linear_ = other.last_linear_;
   }
 
+  void start_from(const Eigen::VectorXd& linear) { last_linear_ = linear; }
+
   /// Takes over noise levels and samples left out from the same run held against another model.
   void keep_noise_of(const RunResidual& other);
 
@@ -167,6 +178,7 @@ class RunResidual {
   Eigen::VectorXd whole_jerk(const Eigen::VectorXd& linear) const;
   bool stack_nonlinear_rows(Linearised& lin, const Eigen::VectorXd& theta, const Eigen::VectorXd& linear) const;
   struct NonlinearPoint;
+  NonlinearPoint along_growing_record(const Linearised& lin, const Eigen::VectorXd& theta, NonlinearPoint point) const;
   NonlinearPoint first_nonlinear_point(const Linearised& lin, const Eigen::VectorXd& theta) const;
   bool worth_going_on(double promised, double chi2) const;
   NonlinearPoint nonlinear_point(const Linearised& lin, const Eigen::VectorXd& theta, const Eigen::VectorXd& linear) const;

@@ -48,7 +48,7 @@ std::shared_ptr<RunResidual::Linearised> RunResidual::linearise(const VectorXd& 
   auto lin = std::make_shared<Linearised>();
   lin->system = model_->system(conditions_, theta, channels_);
   for (DualMatrix* m : {&lin->system.A, &lin->system.B, &lin->system.C, &lin->system.D}) m->partial.clear();
-  lin->step = exact_step(lin->system, run_->dt);
+  lin->step = step_to_follow(lin->system, run_->dt);
   if (lin->system.feedback.empty()) prepare_linear(*lin);
   return lin;
 }

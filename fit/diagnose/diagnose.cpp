@@ -51,7 +51,10 @@ using Trials = std::vector<Trial>;
 
 /// A few rounds for all, the rest for those that are ahead.
 void fit_ahead(Trials& trials) {
-  in_parallel(trials.size(), [&](std::size_t i) { fit_fully(trials[i], 2); });
+  in_parallel(trials.size(), [&](std::size_t i) {
+    if (nonlinear(trials[i])) fit_decays_first(trials[i]);
+    fit_fully(trials[i], 2);
+  });
   std::sort(trials.begin(), trials.end(), [](const Trial& a, const Trial& b) { return a.reduced_chi2() < b.reduced_chi2(); });
   in_parallel(std::min(trials.size(), most_in_full), [&](std::size_t i) {
     const bool near = nonlinear(trials[i]) && trials[i].reduced_chi2() < nearly_explained;

@@ -6,6 +6,7 @@
 
 #include "core/effects/effect.h"
 #include "core/spectrum.h"
+#include "fit/decays_first.h"
 #include "fit/diagnose/mismatch.h"
 #include "fit/fit.h"
 
@@ -123,6 +124,13 @@ Trial prepare(const FitProblem& problem, const Trial& base, const std::vector<st
 void fit_fully(Trial& trial, int rounds) {
   anneal(trial.arrival, rounds);
   measure(trial);
+}
+
+void fit_decays_first(Trial& trial) {
+  JointProblem& joint = trial.arrival.joint;
+  if (!has_decays(joint)) return;
+  fit_decays(joint, trial.effects.back());
+  temper(joint);
 }
 
 void fit_exactly(Trial& trial) {

@@ -29,6 +29,9 @@ Trial fit_baseline(const FitProblem& problem);
 /// One linear step from `base` with `effects` (those of base and one more): what would it remove?
 Trial prepare(const FitProblem& problem, const Trial& base, const std::vector<std::string>& effects);
 
+/// Of a prepared trial whose last effect is nonlinear: theta from the free decays alone (fit/decays_first.h), where there are any.
+void fit_decays_first(Trial& trial);
+
 /// Fits a prepared trial with everything free, while the weights of the runs return to those of their noise, in so many rounds.
 void fit_fully(Trial& trial, int rounds);
 
