@@ -319,7 +319,7 @@ void refine(Arrival& arrival, const FitProblem& problem) {
   JointProblem& joint = arrival.joint;
   for (std::size_t r = 0; r < joint.runs().size(); ++r) {
     joint.runs()[r].settle_noise(joint.theta(r));
-    joint.runs()[r].search_exactly(true);
+    joint.runs()[r].search_exactly(!joint.runs()[r].takes_small_steps(joint.theta(r)));
   }
   constexpr int rounds = 4;
   for (int round = 0; round < rounds; ++round) {

@@ -2,8 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numeric>
+#include <memory>
 
+#include "core/in_parallel.h"
 #include "fit/least_squares.h"
 
 namespace unrig {
@@ -44,18 +45,25 @@ class Decays {
     return least;
   }
 
-  void search(Index samples, const LeastSquaresOptions& options, bool prior) {
-    samples_ = samples;
-    LeastSquaresProblem problem = problem_;
-    for (std::size_t i = 0; prior && i < free_.size(); ++i) problem.terms.push_back(weak_prior(i, problem.unknowns[i]));
-    const LeastSquaresResult result = solve_least_squares(problem, options);
-    if (result.point.finite) take(result.point, problem_);
+  /// Over records that grow from `from` to `to` samples; returns chi-square over the last.
+  double grow(Index from, Index to) {
+    LeastSquaresOptions options;
+    options.effort = LeastSquaresOptions::Effort::once;
+    options.precision = 0.5;
+    options.relative_change = 1e-3;
+    options.iterations = 8;
+    constexpr double growth = 1.5;
+    for (auto samples = from; samples < to; samples = static_cast<Index>(growth * static_cast<double>(samples))) search(samples, options, true);
+    const bool whole = to >= longest();
+    if (whole) options.iterations = 30;
+    search(to, options, !whole);
+    return chi2();
   }
 
   /// chi-square over the degrees of freedom of the whole records; theta and c go back to the joint problem.
   double settle() {
     samples_ = longest();
-    const double chi2 = try_values(problem_, problem_.values()).chi2();
+    const double left = chi2();
     for (std::size_t i = 0; i < free_.size(); ++i) joint_.unknowns()[free_[i]].value = problem_.unknowns[i].value;
     double freedom = -static_cast<double>(free_.size());
     for (std::size_t d = 0; d < decays_.size(); ++d) {
@@ -64,10 +72,23 @@ class Decays {
       joint_.runs()[decays_[d]].start_from(c);
       freedom += static_cast<double>(runs_[d].degrees_of_freedom());
     }
-    return chi2 / std::max(1.0, freedom);
+    return left / std::max(1.0, freedom);
   }
 
  private:
+  double chi2() const {
+    const LeastSquaresPoint point = try_values(problem_, problem_.values());
+    return point.finite ? point.chi2() : INFINITY;
+  }
+
+  void search(Index samples, const LeastSquaresOptions& options, bool prior) {
+    samples_ = samples;
+    LeastSquaresProblem problem = problem_;
+    for (std::size_t i = 0; prior && i < free_.size(); ++i) problem.terms.push_back(weak_prior(i, problem.unknowns[i]));
+    const LeastSquaresResult result = solve_least_squares(problem, options);
+    if (result.point.finite) take(result.point, problem_);
+  }
+
   void add(std::size_t r) {
     const std::size_t d = runs_.size();
     runs_.push_back(joint_.runs()[r]);
@@ -117,36 +138,29 @@ class Decays {
 
 bool has_decays(const JointProblem& joint) { return std::any_of(joint.runs().begin(), joint.runs().end(), is_decay); }
 
-double fit_decays(JointProblem& joint) {
-  Decays decays(joint);
-  LeastSquaresOptions search;
-  search.effort = LeastSquaresOptions::Effort::once;
-  search.precision = 0.5;
-  search.relative_change = 1e-3;
-  search.iterations = 8;
-  constexpr double growth = 1.5;
-  for (auto samples = decays.shortest(); samples < decays.longest(); samples = static_cast<Index>(growth * static_cast<double>(samples))) decays.search(samples, search, true);
-  search.iterations = 30;
-  decays.search(decays.longest(), search, false);
-  return decays.settle();
-}
-
 double fit_decays(JointProblem& joint, const std::string& id) {
-  constexpr double followed = 1.5;
-  const JointProblem start = joint;
-  double least = INFINITY;
+  std::vector<JointProblem> starts;
   for (const double factor : {1.0, 0.2, 5.0}) {
-    JointProblem other = start;
-    for (Unknown& u : other.unknowns())
-      if (const Parameter& p = other.parameter(u); p.name.starts_with(id + ".")) {
+    starts.push_back(joint);
+    for (Unknown& u : starts.back().unknowns())
+      if (const Parameter& p = joint.parameter(u); p.name.starts_with(id + ".")) {
         u.value = std::clamp(factor * u.value, p.lower, p.upper);
         break;
       }
-    const double left = fit_decays(other);
-    if (left < least) least = left, joint = std::move(other);
-    if (least < followed) break;
   }
-  return least;
+  std::vector<std::unique_ptr<Decays>> decays(starts.size());
+  std::vector<double> early(starts.size());
+  constexpr Index part = 8;
+  const auto early_samples = [](const Decays& d) { return std::max(d.shortest(), d.longest() / part); };
+  in_parallel(starts.size(), [&](std::size_t i) {
+    decays[i] = std::make_unique<Decays>(starts[i]);
+    early[i] = decays[i]->grow(decays[i]->shortest(), early_samples(*decays[i]));
+  });
+  const auto best = static_cast<std::size_t>(std::min_element(early.begin(), early.end()) - early.begin());
+  decays[best]->grow(early_samples(*decays[best]), decays[best]->longest());
+  const double left = decays[best]->settle();
+  joint = std::move(starts[best]);
+  return left;
 }
 
 }  // namespace unrig

@@ -1,4 +1,6 @@
+#include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "core/nonlinear_response.h"
 #include "fit/run_linearised.h"
@@ -12,6 +14,10 @@ using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
 namespace {
+
+// Steps of a search for c. From where the equivalent linear system led, exact tangents arrive in a few, or the law has kinks and the next search in theta comes
+// by again.
+constexpr int most_far_away = 30, most_nearby = 8;
 
 /// Jerk and inputs of one segment.
 void drive_over(const Interval& s, bool moving, const VectorXd& jerk, const MatrixXd& inputs, NonlinearDrive& drive) {
@@ -153,7 +159,7 @@ RunResidual::NonlinearPoint RunResidual::first_nonlinear_point(const Linearised&
   const auto consider = [&](const VectorXd& linear) {
     if (NonlinearPoint point = nonlinear_point(lin, theta, linear); point.chi2 < best.chi2 || !std::isfinite(best.chi2)) best = std::move(point);
   };
-  if (guide_.theta.size() == theta.size()) {
+  if (guide_.theta.size() == theta.size() && !from_afar_) {
     const VectorXd predicted = guide_.linear + guide_.slope * (theta - guide_.theta);
     if (predicted.allFinite()) consider(predicted);
     if (std::isfinite(best.chi2) && best.chi2 < 2 * guide_.chi2) return best;
@@ -161,20 +167,29 @@ RunResidual::NonlinearPoint RunResidual::first_nonlinear_point(const Linearised&
   if (last_linear_.size() > 0) consider(last_linear_);
   if (!std::isfinite(best.chi2)) consider(equivalent_linear(lin, VectorXd::Zero(static_cast<Index>(lin.system.feedback.size())))->linear);
   constexpr double followed = 2;
-  if (motion_.unknowns() == 0 && best.chi2 > followed * static_cast<double>(degrees_of_freedom()))
+  if ((motion_.unknowns() == 0 || from_afar_) && best.chi2 * tempered_ * tempered_ > followed * static_cast<double>(degrees_of_freedom()))
     if (NonlinearPoint grown = along_growing_record(lin, theta, best); grown.chi2 < best.chi2) return grown;
   return best;
 }
 
-/// c of a free decay, searched over a part of the record that grows from where any start will do.
+/// c from the angle channel alone.
+VectorXd RunResidual::as_the_angle_says() const {
+  const MatrixXd rows = run_rows::stacked(angle_rows_, unknowns_ + 1);
+  const run_rows::Eliminator angle(rows.leftCols(unknowns_));
+  return angle.solve(angle.rotated(rows.rightCols(1)));
+}
+
+/// c searched along exact tangents over a part of the record that grows from where any start will do.
 RunResidual::NonlinearPoint RunResidual::along_growing_record(const Linearised& lin, const VectorXd& theta, NonlinearPoint point) const {
   constexpr double growth = 1.3;
   RunResidual part = *this;
   Linearised part_lin;
   part_lin.system = lin.system;
   part_lin.step = lin.step;
-  for (part.last_sample_ = std::min(last_sample_, 2 * unknowns_); part.last_sample_ < last_sample_;) {
-    part.search_along_tangents(part_lin, theta, part.nonlinear_point(lin, theta, point.linear));
+  const Index moves = motion_.unknowns() > 0 ? motion_.active().front().first : 0;
+  if (motion_.unknowns() > 0) point.linear = as_the_angle_says();
+  for (part.last_sample_ = std::min(last_sample_, moves + 2 * unknowns_); part.last_sample_ < last_sample_;) {
+    part.search_along_tangents(part_lin, theta, part.nonlinear_point(lin, theta, point.linear), most_far_away);
     if (!std::isfinite(part_lin.chi2)) return point;
     point.linear = part_lin.linear;
     part.last_sample_ = std::min(last_sample_, static_cast<Index>(growth * static_cast<double>(part.last_sample_)) + 1);
@@ -189,14 +204,12 @@ void RunResidual::solve_nonlinear(Linearised& lin, const VectorXd& theta) const 
   if (motion_.unknowns() > 0)
     search_along_equivalent(lin, theta, std::move(point));
   else
-    search_along_tangents(lin, theta, std::move(point));
+    search_along_tangents(lin, theta, std::move(point), most_far_away);
   if (std::isfinite(lin.chi2)) last_linear_ = lin.linear;
 }
 
 /// Levenberg-Marquardt steps in c: a full Gauss-Newton step where chi-square falls by it, else the more damped the longer it does not.
-void RunResidual::search_along_tangents(Linearised& lin, const VectorXd& theta, NonlinearPoint point) const {
-  // From where the equivalent linear system led, exact tangents arrive in a few steps, or the law has kinks and the next search in theta comes by again.
-  const int most = motion_.unknowns() > 0 ? 8 : 30;
+void RunResidual::search_along_tangents(Linearised& lin, const VectorXd& theta, NonlinearPoint point, int most) const {
   constexpr double least_damping = 1e-4, most_damping = 1e4, growth = 10;
   double damping = 0;
   for (int i = 0; i < most; ++i) {
@@ -261,7 +274,7 @@ void RunResidual::search_along_equivalent(Linearised& lin, const VectorXd& theta
   lin.chi2 = point.chi2;
   if (!exact_tangents_) return;
   lin.tangents.reset();
-  search_along_tangents(lin, theta, std::move(point));
+  search_along_tangents(lin, theta, std::move(point), from_afar_ ? most_far_away : most_nearby);
 }
 
 void RunResidual::follow_nonlinear_partials(const LinearSystem& system, const VectorXd& theta, const VectorXd& linear, const TakeRows& take) const {
@@ -284,6 +297,20 @@ void RunResidual::follow_nonlinear_partials(const LinearSystem& system, const Ve
     from.start = response.end;
     from.start_partial = response.end_tangent;
   }
+}
+
+void RunResidual::find_linear(const VectorXd& theta) {
+  const bool exact = std::exchange(exact_tangents_, true);
+  from_afar_ = true;
+  solve(theta);
+  from_afar_ = false;
+  exact_tangents_ = exact;
+  guide_ = {};
+}
+
+bool RunResidual::takes_small_steps(const VectorXd& theta) const {
+  const LinearSystem system = model_->system(conditions_, theta, channels_);
+  return std::any_of(system.feedback.begin(), system.feedback.end(), [](const Feedback& f) { return f.steps_per_sample > 1; });
 }
 
 RunResidual::SideBySide RunResidual::side_by_side(const VectorXd& theta, const VectorXd& linear, Index samples, Partials partials) const {

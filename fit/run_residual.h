@@ -160,6 +160,12 @@ class RunResidual {
   /// where the rig moves so little that the law is far from any line (friction that sticks).
   void search_exactly(bool exact) { exact_tangents_ = exact; }
 
+  /// Moves c of a nonlinear run with prescribed motion to the least chi-square that exact tangents reach over a record that grows, at theta: from there on
+  /// searches along the equivalent linear system stay near it. For laws with corners that the rig crosses all the time (freeplay).
+  void find_linear(const Eigen::VectorXd& theta);
+  /// Whether following the model takes several steps a sample, which makes exact tangents dear.
+  bool takes_small_steps(const Eigen::VectorXd& theta) const;
+
   /// How near c of a nonlinear run is searched to its least chi-square, in standard errors. The slopes of chi-square in theta do not feel what is left: they are
   /// taken across the directions of c.
   void search_linear_to(double precision) { linear_precision_ = precision; }
@@ -178,13 +184,14 @@ class RunResidual {
   Eigen::VectorXd whole_jerk(const Eigen::VectorXd& linear) const;
   bool stack_nonlinear_rows(Linearised& lin, const Eigen::VectorXd& theta, const Eigen::VectorXd& linear) const;
   struct NonlinearPoint;
+  Eigen::VectorXd as_the_angle_says() const;
   NonlinearPoint along_growing_record(const Linearised& lin, const Eigen::VectorXd& theta, NonlinearPoint point) const;
   NonlinearPoint first_nonlinear_point(const Linearised& lin, const Eigen::VectorXd& theta) const;
   bool worth_going_on(double promised, double chi2) const;
   NonlinearPoint nonlinear_point(const Linearised& lin, const Eigen::VectorXd& theta, const Eigen::VectorXd& linear) const;
   std::shared_ptr<Linearised> equivalent_linear(const Linearised& lin, const Eigen::VectorXd& slope) const;
   void solve_nonlinear(Linearised& lin, const Eigen::VectorXd& theta) const;
-  void search_along_tangents(Linearised& lin, const Eigen::VectorXd& theta, NonlinearPoint point) const;
+  void search_along_tangents(Linearised& lin, const Eigen::VectorXd& theta, NonlinearPoint point, int most) const;
   void search_along_equivalent(Linearised& lin, const Eigen::VectorXd& theta, NonlinearPoint point) const;
   void add_prediction_slope(const Linearised& lin, const run_rows::Block& block, const Eigen::MatrixXd& linear_slope, Eigen::MatrixXd& slope) const;
   void prepare_linear(Linearised& lin) const;
@@ -217,7 +224,7 @@ class RunResidual {
   Eigen::MatrixXd weight_;    ///< 1 / sigma, 0 where left out
   std::vector<double> sigma_;
   double tempered_ = 1;
-  bool exact_tangents_ = false;
+  bool exact_tangents_ = false, from_afar_ = false;
   Eigen::VectorXd angle_, angle_weight_;
   double angle_sigma_ = 0;
   Eigen::MatrixXd motion_prior_;  ///< [c | 0]

@@ -50,17 +50,27 @@ bool leaves_nothing(const Trial& trial) { return trial.reduced_chi2() < explaine
 using Trials = std::vector<Trial>;
 
 /// A few rounds for all, the rest for those that are ahead.
-void fit_ahead(Trials& trials) {
-  in_parallel(trials.size(), [&](std::size_t i) {
-    if (nonlinear(trials[i])) fit_decays_first(trials[i]);
-    fit_fully(trials[i], 2);
-  });
+void fit_linear(Trials& trials) {
+  in_parallel(trials.size(), [&](std::size_t i) { fit_fully(trials[i], 2); });
   std::sort(trials.begin(), trials.end(), [](const Trial& a, const Trial& b) { return a.reduced_chi2() < b.reduced_chi2(); });
-  in_parallel(std::min(trials.size(), most_in_full), [&](std::size_t i) {
-    const bool near = nonlinear(trials[i]) && trials[i].reduced_chi2() < nearly_explained;
-    if (near && !leaves_nothing(trials[i])) fit_exactly(trials[i]);
-    fit_fully(trials[i], 6);
-  });
+  in_parallel(std::min(trials.size(), most_in_full), [&](std::size_t i) { fit_fully(trials[i], 6); });
+}
+
+/// By the free decays first, the most promising effect first; none after one that leaves nothing of a mismatch too large for two laws to explain alike.
+void fit_nonlinear(Trials& trials, const Trial& base) {
+  double least = base.reduced_chi2();
+  for (std::size_t i = 0; i < trials.size(); ++i) {
+    Trial& trial = trials[i];
+    if (fit_decays_first(trial, base) && !decays_decide(trial)) {
+      fit_fully(trial, 2);
+      if (trial.reduced_chi2() < nearly_explained && !leaves_nothing(trial)) fit_exactly(trial);
+      if (trial.reduced_chi2() < least) fit_fully(trial, 6);
+    }
+    least = std::min(least, trial.reduced_chi2());
+    if (!leaves_nothing(trial) || base.reduced_chi2() < nearly_explained) continue;
+    trials.erase(trials.begin() + static_cast<std::ptrdiff_t>(i) + 1, trials.end());
+  }
+  std::sort(trials.begin(), trials.end(), [](const Trial& a, const Trial& b) { return a.reduced_chi2() < b.reduced_chi2(); });
 }
 
 bool any_leaves_nothing(const Trials& trials) { return std::any_of(trials.begin(), trials.end(), leaves_nothing); }
@@ -68,6 +78,7 @@ bool any_leaves_nothing(const Trials& trials) { return std::any_of(trials.begin(
 /// All over again for those ahead, and for effects whose own fit has nothing to search in.
 void fit_anew(const FitProblem& problem, Trials& trials) {
   in_parallel(trials.size(), [&](std::size_t i) {
+    if (decays_decide(trials[i])) return;
     if (i < most_in_full || effect(trials[i].effects.back()).parameters.empty()) fit_from_first_guesses(problem, trials[i]);
   });
 }
@@ -91,14 +102,14 @@ Trials try_one_more(const DiagnoseProblem& problem, const FitProblem& fit_proble
   }
   // Linear effects first, which are an order faster; nonlinear ones where none of those leaves nothing.
   const bool favours_linear = others.empty() || (!linear.empty() && linear.front().score >= others.front().score);
-  fit_ahead(linear);
+  fit_linear(linear);
   bool done = any_leaves_nothing(linear);
   if (favours_linear && !done) {
     fit_anew(fit_problem, linear);
     done = any_leaves_nothing(linear);
   }
   if (!done) {
-    fit_ahead(others);
+    fit_nonlinear(others, base);
     done = any_leaves_nothing(others);
     if (!done && !favours_linear) fit_anew(fit_problem, linear);
     if (!done && !any_leaves_nothing(linear)) fit_anew(fit_problem, others);
@@ -206,13 +217,14 @@ Diagnosis diagnose(const DiagnoseProblem& problem) {
   d.ranking.push_back({{}, baseline.reduced_chi2(), 0, 0, 0});
 
   Trial best = baseline;
-  while (best.effects.size() < most_effects && (best.effects.empty() ? d.mismatch.found : best.reduced_chi2() > explained && locate_mismatch(best.arrival.joint).found)) {
+  const auto settled = [&] { return decays_decide(best) && excess(best) < (1 - nearly_all) * excess(baseline); };
+  while (best.effects.size() < most_effects && !settled() && (best.effects.empty() ? d.mismatch.found : best.reduced_chi2() > explained && locate_mismatch(best.arrival.joint).found)) {
     tell(best.effects.empty() ? "trying what may be missing" : "trying what may be missing beside " + best.effects.back());
     const Trials tried = try_one_more(problem, fit_problem, best);
     for (const Trial& t : tried) d.ranking.push_back({t.effects, t.reduced_chi2(), bic_difference(t, baseline), 0, best.effects.empty() ? t.score : 0});
     if (tried.empty() || bic_difference(tried.front(), best) > -decisive) break;
     best = without_superfluous(fit_problem, tried.front());
-    if (nonlinear(best) && best.reduced_chi2() > explained && best.reduced_chi2() < nearly_explained) fit_exactly(best);
+    if (nonlinear(best) && !decays_decide(best) && best.reduced_chi2() > explained && best.reduced_chi2() < nearly_explained) fit_exactly(best);
   }
   give_probabilities(d.ranking);
   std::sort(d.ranking.begin(), d.ranking.end(), [](const Candidate& a, const Candidate& b) { return a.delta_bic < b.delta_bic; });

@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "core/effects/effect.h"
+#include "core/in_parallel.h"
 #include "core/spectrum.h"
 #include "fit/decays_first.h"
 #include "fit/diagnose/mismatch.h"
@@ -79,6 +80,20 @@ void measure(Trial& trial) {
   for (const Unknown& u : joint.unknowns()) trial.variables += u.held ? 0 : 1;
 }
 
+bool takes_small_steps(const JointProblem& joint, std::size_t r) { return joint.runs()[r].takes_small_steps(joint.theta(r)); }
+
+/// Residual power over noise power of the runs whose motion is not estimated.
+double left_of_decays(const Trial& trial) {
+  double power = 0, count = 0;
+  for (std::size_t r = 0; r < trial.variance.size(); ++r) {
+    const RunResidual& run = trial.arrival.joint.runs()[r];
+    if (run.motion().unknowns() > 0) continue;
+    power += static_cast<double>(run.run().samples()) * trial.variance[r];
+    count += static_cast<double>(run.run().samples());
+  }
+  return power / count;
+}
+
 }  // namespace
 
 double Trial::reduced_chi2() const {
@@ -126,15 +141,35 @@ void fit_fully(Trial& trial, int rounds) {
   measure(trial);
 }
 
-void fit_decays_first(Trial& trial) {
+bool decays_decide(const Trial& trial) {
+  const JointProblem& joint = trial.arrival.joint;
+  bool small = false;
+  for (std::size_t r = 0; r < joint.runs().size(); ++r) small = small || takes_small_steps(joint, r);
+  return small && has_decays(joint);
+}
+
+bool fit_decays_first(Trial& trial, const Trial& base) {
   JointProblem& joint = trial.arrival.joint;
-  if (!has_decays(joint)) return;
-  fit_decays(joint, trial.effects.back());
+  if (!has_decays(joint)) {
+    measure(trial);
+    return true;
+  }
+  const double left = fit_decays(joint, trial.effects.back());
+  constexpr double worth_it = 0.5;
+  const bool helps = left < worth_it * left_of_decays(base);
+  if (helps)
+    in_parallel(joint.runs().size(), [&](std::size_t r) {
+      if (takes_small_steps(joint, r)) joint.runs()[r].find_linear(joint.theta(r));
+    });
   temper(joint);
+  measure(trial);
+  return helps;
 }
 
 void fit_exactly(Trial& trial) {
-  for (RunResidual& run : trial.arrival.joint.runs()) run.search_exactly(true);
+  JointProblem& joint = trial.arrival.joint;
+  for (std::size_t r = 0; r < joint.runs().size(); ++r)
+    if (!takes_small_steps(joint, r)) joint.runs()[r].search_exactly(true);
   anneal(trial.arrival, 3);
   measure(trial);
 }

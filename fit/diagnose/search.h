@@ -29,13 +29,19 @@ Trial fit_baseline(const FitProblem& problem);
 /// One linear step from `base` with `effects` (those of base and one more): what would it remove?
 Trial prepare(const FitProblem& problem, const Trial& base, const std::vector<std::string>& effects);
 
-/// Of a prepared trial whose last effect is nonlinear: theta from the free decays alone (fit/decays_first.h), where there are any.
-void fit_decays_first(Trial& trial);
+/// Whether following the model takes several steps a sample (freeplay): what the free decays say of theta then stands, because the least chi-squares of the other
+/// runs in their motion, many and near each other, mislead a search.
+bool decays_decide(const Trial& trial);
+
+/// Of a prepared trial whose last effect is nonlinear: theta from the free decays alone (fit/decays_first.h), where there are any. False where the effect leaves
+/// more than half of what `base` leaves of them: the other runs are not worth the search.
+bool fit_decays_first(Trial& trial, const Trial& base);
 
 /// Fits a prepared trial with everything free, while the weights of the runs return to those of their noise, in so many rounds.
 void fit_fully(Trial& trial, int rounds);
 
-/// The same once more with exact tangents for the motion (RunResidual::search_exactly): for nonlinear effects that nearly explain the runs.
+/// The same once more with exact tangents for the motion (RunResidual::search_exactly), where they are not too dear: for nonlinear effects that nearly explain the
+/// runs.
 void fit_exactly(Trial& trial);
 
 /// The same all over again from first guesses, with windows that grow from a few periods: for effects without which the rig's parameters go far astray. Keeps the better.
