@@ -50,9 +50,11 @@ std::vector<Index> growing_horizons(const std::vector<Run>& runs) {
 
 /// Follows the growing window through the stages [first, last) from the values of the joint fit.
 void follow(Arrival& arrival, const FitProblem& problem, const std::vector<Index>& horizons, std::size_t first, std::size_t last, const ArrivalEffort& effort) {
+  const JointProblem start = arrival.joint;
   for (std::size_t stage = first; stage < last; ++stage) {
     JointProblem longer = make_joint(*arrival.model, problem.runs, arrival.windows, horizons[stage]);
     carry_over(arrival.joint, longer);
+    if (!std::isfinite(longer.chi2())) carry_over(start, longer);  // over a short window a rig that flutters may fit, which the whole record is too long for
     arrival.joint = std::move(longer);
     const bool whole = horizons[stage] == 0;
     tell(problem, whole ? "fitting the whole record" : fmt::format("fitting the first {} samples", horizons[stage]));

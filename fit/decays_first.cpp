@@ -156,11 +156,18 @@ double fit_decays(JointProblem& joint, const std::string& id) {
     decays[i] = std::make_unique<Decays>(starts[i]);
     early[i] = decays[i]->grow(decays[i]->shortest(), early_samples(*decays[i]));
   });
-  const auto best = static_cast<std::size_t>(std::min_element(early.begin(), early.end()) - early.begin());
-  decays[best]->grow(early_samples(*decays[best]), decays[best]->longest());
-  const double left = decays[best]->settle();
-  joint = std::move(starts[best]);
-  return left;
+  std::vector<std::size_t> order{0, 1, 2};
+  std::sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) { return early[a] < early[b]; });
+  constexpr double followed = 1.5, hopeless = 20;
+  double least = INFINITY;
+  for (const std::size_t i : order) {
+    decays[i]->grow(early_samples(*decays[i]), decays[i]->longest());
+    const double left = decays[i]->settle();
+    if (left < least) joint = starts[i];
+    least = std::min(least, left);
+    if (least < followed || least > hopeless) break;
+  }
+  return least;
 }
 
 }  // namespace unrig

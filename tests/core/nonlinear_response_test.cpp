@@ -1,0 +1,90 @@
+// Laws with corners: the steps within a sample that they ask for, and the one that freeplay has.
+#include "core/nonlinear_response.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "core/effects/effect.h"
+#include "tests/support/sample_data.h"
+
+namespace unrig {
+namespace {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+using std::numbers::pi;
+
+constexpr double omega = 2 * pi * 5, dt = 0.01;  // twenty samples a period
+
+double sharp_gap(double z, const double* p, double& slope, double* partial) {
+  slope = std::abs(z) < p[0] ? 1 : 0;
+  partial[0] = std::abs(z) < p[0] ? 0 : (z > 0 ? 1 : -1);
+  return std::clamp(z, -p[0], p[0]);
+}
+
+/// x and x' of x'' = -omega^2 (x - clamp(x, -delta, delta)), from x = 1 at rest.
+MatrixXd behind_a_gap(double delta, Index steps_per_sample, Index samples) {
+  LinearSystem system;
+  system.A = DualMatrix(MatrixXd{{0, 1}, {-omega * omega, 0}});
+  system.B = DualMatrix(MatrixXd{{0}, {omega * omega}});
+  system.C = DualMatrix(MatrixXd::Identity(2, 2));
+  system.D = DualMatrix(MatrixXd::Zero(2, 1));
+  system.coordinates = 1;
+  system.feedback.push_back({Eigen::RowVector2d(1, 0), 0, 1, sharp_gap, steps_per_sample});
+  const VectorXd theta = VectorXd::Constant(1, delta);
+  return follow(system, step_to_follow(system, dt), theta, {Eigen::Vector2d(1, 0), {}, {}, MatrixXd(2, 0), {}}, samples, Partials::none).output;
+}
+
+/// Of the spring behind the gap and of the mass, over what it was at first.
+double energy(const MatrixXd& motion, Index sample, double delta) {
+  const double stretch = std::max(0.0, std::abs(motion(sample, 0)) - delta), speed = motion(sample, 1) / omega;
+  return (stretch * stretch + speed * speed) / ((1 - delta) * (1 - delta));
+}
+
+TEST(NonlinearResponse, AGapKeepsEnergyAndPeriod) {
+  // Beyond the gap half a period of the oscillator on each side; across it 2 delta at the speed omega (1 - delta), twice.
+  constexpr double delta = 0.17, exact = 2 * pi / omega + 4 * delta / (omega * (1 - delta));
+  constexpr int periods = 3;
+  constexpr Index samples = 90;
+  const MatrixXd coarse = behind_a_gap(delta, 1, samples), fine = behind_a_gap(delta, 8, samples);
+  // Where the law has its corner the straight force cuts it: by up to an eighth of a step's change, four times a period; an eighth of the step, a sixty-fourth of
+  // the loss.
+  const double lost_coarse = std::abs(1 - energy(coarse, samples - 1, delta)), lost_fine = std::abs(1 - energy(fine, samples - 1, delta));
+  EXPECT_LT(lost_fine, 0.01);
+  EXPECT_GT(lost_coarse, 8 * lost_fine);
+  std::vector<double> crossings;  // downwards; inside the gap the mass moves evenly
+  for (Index k = 0; k + 1 < samples; ++k)
+    if (fine(k, 0) > 0 && fine(k + 1, 0) <= 0) crossings.push_back(dt * (static_cast<double>(k) + fine(k, 0) / (fine(k, 0) - fine(k + 1, 0))));
+  ASSERT_GT(crossings.size(), static_cast<std::size_t>(periods));
+  EXPECT_NEAR((crossings[periods] - crossings[0]) / periods / exact, 1, 1e-3) << "a loss of 1 % would change it by 0.1 %";
+}
+
+TEST(NonlinearResponse, FreeplaysLawIsAGapWithRoundedCorners) {
+  const Rig rig = read_rig(test::null_campaign("rig.toml"));
+  const AeroelasticModel model = AeroelasticModel(rig, make_basis(rig, Index{1}, Index{1}), wagner(Wagner::jones)).with_effects({"freeplay"});
+  Conditions conditions;
+  conditions.density = 1.2;
+  const LinearSystem system = model.system(conditions, model.start_values(), {"gauge"});
+  ASSERT_EQ(system.feedback.size(), 1u);
+  const auto law = system.feedback.front().law;
+  const double half = 2e-3, h = 1e-9;
+  double slope = 0, ignored = 0, partial[1] = {}, none[1] = {};
+  const auto at = [&](double z, double gap) { return law(z, &gap, ignored, none); };
+  for (double z = -3 * half; z <= 3 * half; z += 0.0317 * half) {
+    const double value = law(z, &half, slope, partial), sharp = std::clamp(z, -half, half);
+    const bool corner = std::abs(std::abs(z) - half) < 0.41 * half;
+    EXPECT_LE(std::abs(value - sharp), corner ? 0.11 * half : 1e-18) << z << ": a corner of width w is cut by w/4 at most";
+    EXPECT_NEAR(slope, (at(z + h, half) - at(z - h, half)) / (2 * h), 1e-5) << z;
+    EXPECT_NEAR(partial[0], (at(z, half + h) - at(z, half - h)) / (2 * h), 1e-5) << z;
+    EXPECT_EQ(value, -at(-z, half)) << z;
+  }
+  double zero = 0;
+  EXPECT_EQ(law(1e-3, &zero, slope, partial), 0) << "no gap takes nothing";
+}
+
+}  // namespace
+}  // namespace unrig

@@ -1,0 +1,72 @@
+#include "fit/decays_first.h"
+
+#include <gtest/gtest.h>
+
+#include <random>
+
+#include "core/in_parallel.h"
+#include "fit/diagnose/search.h"
+#include "fit/diagnose/trial_campaign.h"
+#include "tests/support/sample_data.h"
+
+namespace unrig {
+namespace {
+
+using Eigen::Index;
+using Eigen::VectorXd;
+
+TEST(DecaysFirst, ResidualAndSlopesSideBySide) {
+  const Rig rig = read_rig(test::null_campaign("rig.toml"));
+  const unrig::Run run = read_run(test::null_campaign("wet_pluck.csv"));
+  const AeroelasticModel model = AeroelasticModel(rig, make_basis(rig, Index{2}, Index{1}), wagner(Wagner::jones)).with_effects({"cubic-stiffness"});
+  VectorXd theta = model.start_values();
+  theta[model.index("cubic-stiffness.coefficient")] = 1e6;
+  const RunResidual residual(model, run, {});
+  VectorXd c = residual.solve(theta).linear;
+  c.head(c.size() - 1) *= 0.9;  // off any least chi-square
+  constexpr Index samples = 400;
+  const auto chi2 = [&](const VectorXd& at, const VectorXd& linear) { return residual.side_by_side(at, linear, samples, Partials::none).chi2; };
+  const RunResidual::SideBySide s = residual.side_by_side(theta, c, samples, Partials::all);
+  EXPECT_NEAR(s.residual.squaredNorm(), s.chi2, 1e-9 * s.chi2);
+  EXPECT_NEAR(s.chi2, chi2(theta, c), 1e-9 * s.chi2);
+  const VectorXd in_theta = 2 * s.in_theta.transpose() * s.residual, in_c = 2 * s.in_c.transpose() * s.residual;
+  const auto slope_of = [&](VectorXd& x, Index j, double h) {
+    const double there = x[j];
+    x[j] = there + h;
+    const double up = chi2(theta, c);
+    x[j] = there - h;
+    const double down = chi2(theta, c);
+    x[j] = there;
+    return (up - down) / (2 * h);
+  };
+  for (const char* name : {"normal.stiffness_scale", "normal.damping_ratio", "apparent_mass_coefficient", "cubic-stiffness.coefficient"}) {
+    const Index j = model.index(name);
+    EXPECT_NEAR(slope_of(theta, j, 1e-4 * theta[j]), in_theta[j], 1e-4 * std::abs(in_theta[j])) << name;  // a ten-thousandth squared, times the curvature
+  }
+  const double largest = in_c.cwiseProduct(c).cwiseAbs().maxCoeff();
+  for (Index j = 0; j < c.size(); ++j) {
+    if (c[j] == 0) continue;
+    EXPECT_NEAR(slope_of(c, j, 1e-4 * c[j]) * c[j], in_c[j] * c[j], 1e-4 * largest) << j;
+  }
+}
+
+TEST(DecaysFirst, FreeplayIsFoundFromATorsionSpringThatIsFarOff) {
+  // The fit without the gap takes it for a soft, strongly damped torsion spring. The campaign is simulated in 32 steps a sample, the fit takes eight.
+  std::seed_seq sequence{8u, 1u};
+  std::mt19937_64 random(sequence);
+  const TrialCampaign campaign = draw_campaign(read_rig(test::null_campaign("rig.toml")), {"freeplay"}, 0.03, random);
+  FitProblem problem;
+  problem.rig = campaign.rig;
+  problem.runs = campaign.runs;
+  const Trial baseline = fit_baseline(problem);
+  ASSERT_GT(baseline.reduced_chi2(), 10);
+  Trial trial = prepare(problem, baseline, {"freeplay"});
+  ASSERT_TRUE(has_decays(trial.arrival.joint));
+  const double left = fit_decays(trial.arrival.joint, "freeplay");
+  EXPECT_LT(left, 1.2);
+  ASSERT_EQ(unknowns_of(trial.arrival.joint, "freeplay").size(), 1u);
+  EXPECT_NEAR(unknowns_of(trial.arrival.joint, "freeplay").front()->value / campaign.parameters.front(), 1, 0.005);
+}
+
+}  // namespace
+}  // namespace unrig
