@@ -95,11 +95,12 @@ Trials try_one_more(const DiagnoseProblem& problem, const FitProblem& fit_proble
   });
   std::sort(prepared.begin(), prepared.end(), [](const auto& a, const auto& b) { return a->score > b->score; });
   const double best_score = prepared.empty() ? 0 : prepared.front()->score;
-  Trials linear, others;
+  Trials linear, others, unpromising;
   for (const auto& trial : prepared) {
     const bool promises_nothing = effect(trial->effects.back()).parameters.empty();  // it may hold all the same
     const bool promises = linear.size() + others.size() < most_refits && trial->score > 0.25 * best_score;
     if (prepared.size() <= few || promises_nothing || promises) (nonlinear(*trial) ? others : linear).push_back(std::move(*trial));
+    else if (unpromising.size() < most_in_full && !nonlinear(*trial)) unpromising.push_back(std::move(*trial));
   }
   // Linear effects first, which are an order faster; nonlinear ones where none of those leaves nothing.
   const bool favours_linear = others.empty() || (!linear.empty() && linear.front().score >= others.front().score);
@@ -115,6 +116,10 @@ Trials try_one_more(const DiagnoseProblem& problem, const FitProblem& fit_proble
     if (!done && !favours_linear) fit_anew(fit_problem, linear);
     if (!done && !any_leaves_nothing(linear)) fit_anew(fit_problem, others);
     std::move(others.begin(), others.end(), std::back_inserter(linear));
+    if (!any_leaves_nothing(linear)) {  // far from the truth one linear step promises little of what there is
+      fit_anew(fit_problem, unpromising);
+      std::move(unpromising.begin(), unpromising.end(), std::back_inserter(linear));
+    }
   }
   std::sort(linear.begin(), linear.end(), [](const Trial& a, const Trial& b) { return bic_difference(a, b) < 0; });
   return linear;

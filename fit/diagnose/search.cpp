@@ -180,7 +180,7 @@ void fit_from_first_guesses(const FitProblem& problem, Trial& trial) {
   temper(other.arrival.joint);
   anneal(other.arrival, 5);
   measure(other);
-  if (bic_difference(other, trial) < 0) trial = std::move(other);
+  if (trial.variance.empty() || bic_difference(other, trial) < 0) trial = std::move(other);
 }
 
 }  // namespace unrig
