@@ -47,6 +47,11 @@ bool nonlinear(const Trial& trial) {
 
 bool leaves_nothing(const Trial& trial) { return trial.reduced_chi2() < explained; }
 
+/// Near the truth, and not there: what is left may be the equivalent linear system's.
+bool worth_exact_tangents(const Trial& trial) {
+  return trial.reduced_chi2() < nearly_explained && !leaves_nothing(trial) && nonlinear(trial) && !decays_decide(trial);
+}
+
 /// Some trials, the best first once they are fitted.
 using Trials = std::vector<Trial>;
 
@@ -64,7 +69,7 @@ void fit_nonlinear(Trials& trials, const Trial& base) {
     Trial& trial = trials[i];
     if (fit_decays_first(trial, base) && !decays_decide(trial)) {
       fit_fully(trial, 2);
-      if (trial.reduced_chi2() < nearly_explained && !leaves_nothing(trial)) fit_exactly(trial);
+      if (worth_exact_tangents(trial)) fit_exactly(trial);
       if (trial.reduced_chi2() < least) fit_fully(trial, 6);
     }
     least = std::min(least, trial.reduced_chi2());
@@ -132,6 +137,7 @@ Trial without_superfluous(const FitProblem& fit_problem, Trial trial) {
     fewer.erase(fewer.begin() + static_cast<std::ptrdiff_t>(k));
     Trial smaller = prepare(fit_problem, trial, fewer);
     fit_fully(smaller, 6);
+    if (worth_exact_tangents(smaller)) fit_exactly(smaller);  // as the larger set has been
     if (bic_difference(smaller, trial) < decisive)
       trial = std::move(smaller);
     else
@@ -185,9 +191,17 @@ void describe(const DiagnoseProblem& problem, const FitProblem& fit_problem, con
   }
 }
 
+/// Whether the search has taken the size of an effect (its first parameter) to zero: another one does its work.
+bool is_idle(const JointProblem& joint, const std::string& id) {
+  for (const Unknown& u : joint.unknowns())
+    if (joint.parameter(u).name.starts_with(id + ".")) return u.value == 0;
+  return false;
+}
+
 /// The effects of the best set, and the sets that are as good.
 void name_missing(const Trial& baseline, const Trial& best, Diagnosis& d) {
   for (const std::string& id : best.effects) {
+    if (is_idle(best.arrival.joint, id)) continue;
     const Effect& e = effect(id);
     MissingEffect m{id, 0, e.equation, e.source, {}};
     for (const Candidate& c : d.ranking)
@@ -229,7 +243,7 @@ Diagnosis diagnose(const DiagnoseProblem& problem) {
     for (const Trial& t : tried) d.ranking.push_back({t.effects, t.reduced_chi2(), bic_difference(t, baseline), 0, best.effects.empty() ? t.score : 0});
     if (tried.empty() || bic_difference(tried.front(), best) > -decisive) break;
     best = without_superfluous(fit_problem, tried.front());
-    if (nonlinear(best) && !decays_decide(best) && best.reduced_chi2() > explained && best.reduced_chi2() < nearly_explained) fit_exactly(best);
+    if (worth_exact_tangents(best)) fit_exactly(best);
   }
   give_probabilities(d.ranking);
   std::sort(d.ranking.begin(), d.ranking.end(), [](const Candidate& a, const Candidate& b) { return a.delta_bic < b.delta_bic; });
