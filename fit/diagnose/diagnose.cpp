@@ -107,17 +107,18 @@ Trials try_one_more(const DiagnoseProblem& problem, const FitProblem& fit_proble
     if (prepared.size() <= few || promises_nothing || promises) (nonlinear(*trial) ? others : linear).push_back(std::move(*trial));
     else if (unpromising.size() < most_in_full && !nonlinear(*trial)) unpromising.push_back(std::move(*trial));
   }
-  // Linear effects first, which are an order faster; nonlinear ones where none of those leaves nothing.
-  const bool favours_linear = others.empty() || (!linear.empty() && linear.front().score >= others.front().score);
+  // Linear effects first, which are an order faster; nonlinear ones where none of those leaves nothing or they promise as much.
+  constexpr double clearly = 0.8;
+  const bool favours_linear = others.empty() || (!linear.empty() && clearly * linear.front().score >= others.front().score);
   fit_linear(linear);
   bool done = any_leaves_nothing(linear);
   if (favours_linear && !done) {
     fit_anew(fit_problem, linear);
     done = any_leaves_nothing(linear);
   }
-  if (!done) {
+  if (!done || !favours_linear) {  // a decaying tone may leave nothing of what a weak drag does, and explain it worse
     fit_nonlinear(others, base);
-    done = any_leaves_nothing(others);
+    done = done || any_leaves_nothing(others);
     if (!done && !favours_linear) fit_anew(fit_problem, linear);
     if (!done && !any_leaves_nothing(linear)) fit_anew(fit_problem, others);
     std::move(others.begin(), others.end(), std::back_inserter(linear));
