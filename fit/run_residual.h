@@ -33,7 +33,7 @@ struct RunOptions {
 /// sees only theta.
 ///
 /// With nonlinear effects at work the linear unknowns enter nonlinearly too, and c is searched for at every theta: in runs without prescribed motion by
-/// Gauss-Newton steps along exact tangents (core/nonlinear_response.h); in runs with it along those of the equivalent linear system (force and state by
+/// Levenberg-Marquardt steps along exact tangents (core/nonlinear_response.h); in runs with it along those of the equivalent linear system (force and state by
 /// least squares along the response), because exact ones would cost n x n x (knots) a sample. The prediction itself and its partials in theta are exact in
 /// both; where c stops is then off by the difference of the tangents times what the residual happens to hold of them, a small part of c's own error.
 ///
