@@ -150,12 +150,12 @@ bool decays_decide(const Trial& trial) {
 
 bool fit_decays_first(Trial& trial, const Trial& base) {
   JointProblem& joint = trial.arrival.joint;
-  if (!has_decays(joint)) {
+  constexpr double followed = 2, worth_it = 0.5;
+  if (!has_decays(joint) || left_of_decays(base) < followed) {
     measure(trial);
     return true;
   }
   const double left = fit_decays(joint, trial.effects.back());
-  constexpr double worth_it = 0.5;
   const bool helps = left < worth_it * left_of_decays(base);
   if (helps)
     in_parallel(joint.runs().size(), [&](std::size_t r) {

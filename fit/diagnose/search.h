@@ -33,8 +33,8 @@ Trial prepare(const FitProblem& problem, const Trial& base, const std::vector<st
 /// runs in their motion, many and near each other, mislead a search.
 bool decays_decide(const Trial& trial);
 
-/// Of a prepared trial whose last effect is nonlinear: theta from the free decays alone (fit/decays_first.h), where there are any. False where the effect leaves
-/// more than half of what `base` leaves of them: the other runs are not worth the search.
+/// Of a prepared trial whose last effect is nonlinear: theta from the free decays alone (fit/decays_first.h), where there are any that
+/// `base` does not follow. False where the effect leaves more than half of what `base` leaves of them: the other runs are not worth the search.
 bool fit_decays_first(Trial& trial, const Trial& base);
 
 /// Fits a prepared trial with everything free, while the weights of the runs return to those of their noise, in so many rounds.
