@@ -41,6 +41,8 @@ struct Feedback {
   Eigen::Index parameters = 0;
   /// f(z) for the parameters p, and its derivatives in z and in each of p.
   double (*law)(double z, const double* p, double& slope, double* partial) = nullptr;
+  /// For searches, the same with its corners rounded; none where it has no corners.
+  double (*rounded)(double z, const double* p, double& slope, double* partial) = nullptr;
   Eigen::Index steps_per_sample = 1;  ///< in which its response is followed: more where z crosses a corner of the law within a sample
 };
 

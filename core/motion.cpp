@@ -92,6 +92,21 @@ std::vector<Interval> MotionBasis::active() const {
   return intervals;
 }
 
+std::vector<MotionBasis::Phase> MotionBasis::phases() const {
+  std::vector<Phase> phases;
+  Index at = 0;
+  for (const Interval& interval : active()) {
+    if (interval.first > at) phases.push_back({{at, interval.first}, false});
+    if (interval.first < at)  // the last splines of one window still act when the next begins
+      phases.back().samples.last = interval.last;
+    else
+      phases.push_back({interval, true});
+    at = interval.last;
+  }
+  if (at < samples_) phases.push_back({{at, samples_}, false});
+  return phases;
+}
+
 VectorXd MotionBasis::coefficients(const VectorXd& u) const {
   VectorXd c = VectorXd::Zero(samples_);
   // A level adds to all that came before; each window's knots are relative to the level they start from.

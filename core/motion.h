@@ -29,6 +29,12 @@ class MotionBasis {
   const std::vector<Window>& windows() const { return windows_; }
   /// Samples during which the jerk may differ from zero, one interval per window.
   std::vector<Interval> active() const;
+  /// The record in turn: intervals in which the shaft moves, those of windows whose splines overlap as one, and the rests between.
+  struct Phase {
+    Interval samples;
+    bool moving;
+  };
+  std::vector<Phase> phases() const;
 
   /// A column of S: fine coefficients `value` from fine knot `first` on; a level continues with `tail` to the end of the record.
   struct Column {

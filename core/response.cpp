@@ -194,4 +194,9 @@ MatrixXd spline_states(const ExactStep& step, Index samples) {
   return states;
 }
 
+void stand_still(MatrixXd& states, Index motion, const Eigen::RowVectorXd& angle) {
+  states.row(motion) = angle;
+  states.middleRows(motion + 1, 2).setZero();
+}
+
 }  // namespace unrig

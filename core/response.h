@@ -52,4 +52,8 @@ std::vector<Eigen::MatrixXd> free_response_rows(const LinearSystem& system, cons
 /// States that follow a unit cubic B-spline starting at sample 0, at samples 0..samples-1: n x samples.
 Eigen::MatrixXd spline_states(const ExactStep& step, Eigen::Index samples);
 
+/// A shaft that has come to rest stands exactly still at `angle` (one per column of states): the rounding of its acceleration, eps/dt^3 of a
+/// spline, would turn it on with the square of the time. `motion` is the row of the angle; rate and acceleration follow it.
+void stand_still(Eigen::MatrixXd& states, Eigen::Index motion, const Eigen::RowVectorXd& angle);
+
 }  // namespace unrig

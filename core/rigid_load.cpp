@@ -37,34 +37,13 @@ LinearSystem lag_system(const VectorXd& rate, double U, double b, const RowVecto
   return s;
 }
 
-/// The record in turn: intervals in which the shaft moves, and the rests between.
-struct Phase {
-  Interval samples;
-  bool moving;
-};
-
-std::vector<Phase> phases_of(const MotionBasis& motion) {
-  std::vector<Phase> phases;
-  Index at = 0;
-  for (const Interval& active : motion.active()) {
-    if (active.first > at) phases.push_back({{at, active.first}, false});
-    if (active.first < at)  // the last splines of one window still act when the next begins
-      phases.back().samples.last = active.last;
-    else
-      phases.push_back({active, true});
-    at = active.last;
-  }
-  if (at < motion.samples()) phases.push_back({{at, motion.samples()}, false});
-  return phases;
-}
-
 /// State of the lags and the motion over the record, and how it moves with the motion's unknowns.
 class Lags {
  public:
   Lags(const LinearSystem& system, const ExactStep& step, const MotionBasis& motion, const VectorXd& unknowns)
-      : system_(system), step_(step), motion_(motion), moves_(motion_of(motion.coefficients(unknowns), step.dt)), phases_(phases_of(motion)) {
+      : system_(system), step_(step), motion_(motion), moves_(motion_of(motion.coefficients(unknowns), step.dt)), phases_(motion.phases()) {
     Index longest = 0;
-    for (const Phase& phase : phases_)
+    for (const MotionBasis::Phase& phase : phases_)
       if (phase.moving) longest = std::max(longest, phase.samples.length());
     unit_ = spline_states(step, longest + 1);
     summed_ = unit_;
@@ -78,11 +57,11 @@ class Lags {
     const FreeResponse free(system, step_, Partials::none);
     MatrixXd all(motion_.samples(), rows.rows());
     DualMatrix state(MatrixXd::Zero(system.states(), 1));
-    for (const Phase& phase : phases_) {
+    for (const MotionBasis::Phase& phase : phases_) {
       const Interval& s = phase.samples;
       const Response response = phase.moving ? drive(system, step_, state, s.length(), moves_.jerk.segment(s.first, s.length()), {}, Partials::none) : free.from(state, s.length());
       state = response.end;
-      if (phase.moving && s.last < motion_.samples()) stand_still(state.value, moves_.angle.segment(s.last, 1));
+      if (phase.moving && s.last < motion_.samples()) stand_still(state.value, system_.motion, moves_.angle.segment(s.last, 1));
       all.middleRows(s.first, s.length()) = response.output;
     }
     return all;
@@ -95,7 +74,7 @@ class Lags {
     VectorXd state = VectorXd::Zero(n);
     MatrixXd slope = MatrixXd::Zero(n, motion_.unknowns());
     std::size_t next = 0;
-    for (const Phase& phase : phases_) {
+    for (const MotionBasis::Phase& phase : phases_) {
       const Interval& s = phase.samples;
       MatrixXd states;  // samples x n
       if (phase.moving) {
@@ -115,19 +94,13 @@ class Lags {
       std::tie(state, slope) = behind(s.last);
       if (!phase.moving || s.last >= motion_.samples()) continue;
       MatrixXd column = state;
-      stand_still(column, moves_.angle.segment(s.last, 1));
+      stand_still(column, system_.motion, moves_.angle.segment(s.last, 1));
       state = column.col(0);
-      stand_still(slope, motion_.angle_columns({s.last, s.last + 1}));
+      stand_still(slope, system_.motion, motion_.angle_columns({s.last, s.last + 1}));
     }
   }
 
  private:
-  /// A shaft that has come to rest stands exactly still: the rounding of its acceleration, eps/dt^3 of a spline, would turn it on with the square of the time.
-  static void stand_still(MatrixXd& state, const RowVectorXd& angle) {
-    state.row(state.rows() - 3) = angle;
-    state.bottomRows(2).setZero();
-  }
-
   /// The jerk over these samples and, where the record goes on, the next.
   static VectorXd with_one_more(const VectorXd& jerk, const Interval& s) {
     VectorXd longer = VectorXd::Zero(s.length() + 1);
@@ -153,7 +126,7 @@ class Lags {
   const ExactStep& step_;
   const MotionBasis& motion_;
   Motion moves_;
-  std::vector<Phase> phases_;
+  std::vector<MotionBasis::Phase> phases_;
   MatrixXd unit_, summed_;  // states after a unit spline, and their running sum
 };
 

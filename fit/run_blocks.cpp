@@ -1,6 +1,6 @@
 #include "fit/run_linearised.h"
 
-// Rotations of the rows of one channel over one segment.
+// Rotations of the rows of one channel over one phase of the record.
 
 namespace unrig::run_rows {
 

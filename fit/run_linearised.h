@@ -95,7 +95,7 @@ struct Rotated {
   std::vector<Eigen::MatrixXd> kept, others;
 };
 
-/// One channel over one segment. A segment at rest spans only the free response and the offset: its rows are rotated, stretch by stretch and then those kept of
+/// One channel over one phase of the record. A phase at rest spans only the free response and the offset: its rows are rotated, stretch by stretch and then those kept of
 /// all stretches together, so that few of them hold all that c can reach, and the others only what is left. One in which the shaft moves is rotated where its
 /// own splines, the free response and the offset are clearly fewer than its samples.
 class Block {
@@ -105,8 +105,8 @@ class Block {
   Interval samples;
   bool moving = false;
   Eigen::Index channel = 0;
-  Eigen::MatrixXd start;         ///< d state / d c at the segment's start
-  Eigen::MatrixXd rows;          ///< nonlinear systems: d y / d c where the shaft moves, else d y / d state at the segment's start
+  Eigen::MatrixXd start;         ///< d state / d c at the phase's start
+  Eigen::MatrixXd rows;          ///< nonlinear systems: d y / d c where the shaft moves, else d y / d state at the phase's start
   Eigen::Index smooth_from = 0;  ///< at rest: the sample from which on whole stretches are polynomials; samples.last where none is
 
   Block(const Interval& of, bool moves, Eigen::Index in_channel, Eigen::MatrixXd from, Eigen::MatrixXd tangents, Eigen::Index smooth)
@@ -114,7 +114,7 @@ class Block {
 
   bool is_smooth(const Interval& stretch) const { return !moving && stretch.first >= smooth_from && stretch.length() == rest_rows::stretch_samples; }
 
-  /// Sets up the rotation of the next stretch, from its weighted rows over [state at the segment's start | offset]; returns those kept.
+  /// Sets up the rotation of the next stretch, from its weighted rows over [state at the phase's start | offset]; returns those kept.
   Eigen::MatrixXd add_stretch(Eigen::MatrixXd span);
   /// The same for a constant weight, from the rotation for a weight of one.
   Eigen::MatrixXd add_stretch(double weight, const Rotation& rotation);
@@ -162,7 +162,7 @@ struct RunResidual::Linearised {
   Eigen::MatrixXd leap;                   // transition over a stretch at rest
   bool polynomials = false;               // whether what is left of a rest may be looked at as polynomials
 
-  std::vector<run_rows::Block> blocks;  // segment by segment, channel by channel
+  std::vector<run_rows::Block> blocks;  // phase by phase, channel by channel
   std::shared_ptr<const Linearised> tangents;  // of a nonlinear run with prescribed motion: its equivalent linear system, which c is searched along
 
   /// Solves the stacked rows [c | y] for c, beside a sum of squares that c cannot reach.

@@ -19,7 +19,7 @@ namespace {
 // by again.
 constexpr int most_far_away = 30, most_nearby = 8;
 
-/// Jerk and inputs of one segment.
+/// Jerk and inputs of one phase.
 void drive_over(const Interval& s, bool moving, const VectorXd& jerk, const MatrixXd& inputs, NonlinearDrive& drive) {
   drive.jerk = moving ? VectorXd(jerk.segment(s.first, s.length())) : VectorXd();
   drive.input = inputs.cols() > 0 ? MatrixXd(inputs.middleRows(s.first, s.length() + 1)) : MatrixXd(s.length() + 1, 0);
@@ -89,20 +89,20 @@ bool RunResidual::stack_nonlinear_rows(Linearised& lin, const VectorXd& theta, c
   std::vector<MatrixXd> rows;
   double unreachable = 0;
   lin.blocks.clear();
-  for (const Segment& segment : segments_) {
-    const Interval s = counted(segment);
+  for (const MotionBasis::Phase& phase : phases_) {
+    const Interval s = counted(phase);
     if (s.length() <= 0) break;
-    drive_over(s, segment.moving, jerk, inputs_, from);
-    from.start_tangent = segment.moving ? start : MatrixXd::Identity(n, n);
-    from.jerk_tangent = segment.moving ? jerk_slope(s) : MatrixXd();
+    drive_over(s, phase.moving, jerk, inputs_, from);
+    from.start_tangent = phase.moving ? start : MatrixXd::Identity(n, n);
+    from.jerk_tangent = phase.moving ? jerk_slope(s) : MatrixXd();
     NonlinearResponse response = follow(lin.system, lin.step, theta, from, s.length(), Partials::none);
     if (!response.finite) return false;
     for (Index c = 0; c < measured_.cols(); ++c) {
       const auto w = weight_.col(c).segment(s.first, s.length());
-      run_rows::Block block{s, segment.moving, c, start, std::move(response.tangent[static_cast<std::size_t>(c)]), s.last};
+      run_rows::Block block{s, phase.moving, c, start, std::move(response.tangent[static_cast<std::size_t>(c)]), s.last};
       VectorXd y = measured_.col(c).segment(s.first, s.length()) - response.output.col(c);  // beside the offset, which stays linear
       MatrixXd reach;
-      if (segment.moving) {
+      if (phase.moving) {
         y += block.rows * linear;
         block.rows.col(first_offset_ + c).setOnes();
         reach = w.asDiagonal() * block.rows;
@@ -119,7 +119,7 @@ bool RunResidual::stack_nonlinear_rows(Linearised& lin, const VectorXd& theta, c
       lin.blocks.push_back(std::move(block));
     }
     from.start = response.end;
-    start = segment.moving ? response.end_tangent : MatrixXd(response.end_tangent * start);
+    start = phase.moving ? response.end_tangent : MatrixXd(response.end_tangent * start);
   }
   rows.insert(rows.end(), angle_rows_.begin(), angle_rows_.end());
   lin.settle(rows, unknowns_, unreachable);
@@ -283,10 +283,10 @@ void RunResidual::follow_nonlinear_partials(const LinearSystem& system, const Ve
   const VectorXd jerk = whole_jerk(linear);
   NonlinearDrive from{initial_state(linear, system.states()), {}, {}, MatrixXd(system.states(), 0), {}};
   std::size_t block = 0;
-  for (const Segment& segment : segments_) {
-    const Interval s = counted(segment);
+  for (const MotionBasis::Phase& phase : phases_) {
+    const Interval s = counted(phase);
     if (s.length() <= 0) break;
-    drive_over(s, segment.moving, jerk, inputs_, from);
+    drive_over(s, phase.moving, jerk, inputs_, from);
     const NonlinearResponse response = follow(system, step, theta, from, s.length(), Partials::all);
     for (Index c = 0; c < measured_.cols(); ++c) {
       MatrixXd m(s.length(), parameters + 1);
@@ -316,7 +316,7 @@ bool RunResidual::takes_small_steps(const VectorXd& theta) const {
 RunResidual::SideBySide RunResidual::side_by_side(const VectorXd& theta, const VectorXd& linear, Index samples, Partials partials) const {
   samples = std::min(samples, last_sample_);
   const bool slopes = partials == Partials::all;
-  LinearSystem system = slopes ? differentiable_system(theta) : model_->system(conditions_, theta, channels_);
+  LinearSystem system = slopes ? differentiable_system(theta) : searched_system(theta);
   if (!slopes)
     for (DualMatrix* m : {&system.A, &system.B, &system.C, &system.D}) m->partial.clear();
   const Index n = system.states(), states = static_cast<Index>(free_.size()), channels = measured_.cols(), parameters = static_cast<Index>(model_->parameters().size());

@@ -100,17 +100,7 @@ RunResidual::RunResidual(const AeroelasticModel& model, const Run& run, std::vec
     }
   }
   inputs_ = run_inputs(run, conditions_);
-
-  Index at = 0;
-  for (const Interval& i : active) {
-    if (i.first > at) segments_.push_back({{at, i.first}, false});
-    if (i.first < at)  // the last splines of one window still act when the next begins
-      segments_.back().samples.last = i.last;
-    else
-      segments_.push_back({i, true});
-    at = i.last;
-  }
-  if (at < n) segments_.push_back({{at, n}, false});
+  phases_ = motion_.phases();
 
   // A step starts in the steady state of its first angle; everything else starts anyhow.
   const LinearSystem system = model.system(conditions_, model.start_values(), channels_);
@@ -138,11 +128,11 @@ void RunResidual::prepare_angle_rows() {
   angle_rows_.clear();
   if (motion_prior_.rows() > 0) angle_rows_.push_back(motion_prior_);
   if (angle_offset_ < 0) return;
-  for (const Segment& segment : segments_) {
-    const Interval& s = segment.samples;
+  for (const MotionBasis::Phase& phase : phases_) {
+    const Interval& s = phase.samples;
     const auto w = angle_weight_.segment(s.first, s.length());
     const auto y = angle_.segment(s.first, s.length());
-    if (segment.moving) {
+    if (phase.moving) {
       angle_rows_.push_back(angle_rows_in_motion(s));
       continue;
     }

@@ -174,10 +174,6 @@ class RunResidual {
   const Eigen::VectorXd& angle_weight() const { return angle_weight_; }
 
  private:
-  struct Segment {
-    Interval samples;
-    bool moving;
-  };
   std::shared_ptr<Linearised> linearise(const Eigen::VectorXd& theta) const;
   void weights_changed();
   void stack_rows(Linearised& lin) const;
@@ -199,16 +195,17 @@ class RunResidual {
   void follow_partials(const Eigen::VectorXd& theta, const Eigen::VectorXd& linear, const std::vector<run_rows::Block>& blocks, const TakeRows& take) const;
   void follow_nonlinear_partials(const LinearSystem& system, const Eigen::VectorXd& theta, const Eigen::VectorXd& linear, const TakeRows& take) const;
   Eigen::MatrixXd jerk_slope(const Interval& samples) const;
+  LinearSystem searched_system(const Eigen::VectorXd& theta) const;
   LinearSystem differentiable_system(const Eigen::VectorXd& theta) const;
   Eigen::MatrixXd motion_state_columns(const Linearised& lin, const Interval& samples) const;
-  Eigen::MatrixXd state_behind(const Linearised& lin, const Segment& segment, const Interval& samples, const Eigen::MatrixXd& start) const;
+  Eigen::MatrixXd state_behind(const Linearised& lin, const MotionBasis::Phase& phase, const Interval& samples, const Eigen::MatrixXd& start) const;
   Eigen::Index smooth_from(const Linearised& lin, const Interval& samples, const Eigen::MatrixXd& start) const;
   Eigen::MatrixXd reach_at_rest(const Linearised& lin, run_rows::Block& block) const;
   Eigen::MatrixXd reach_in_motion(const Linearised& lin, run_rows::Block& block) const;
   std::pair<Eigen::Index, Eigen::Index> splines_in(const Interval& samples) const;
   run_rows::Rotated rotated_readings(const Linearised& lin, const run_rows::Block& block, double& beside) const;
   const rest_rows::SmoothReadings& smooth_readings(Eigen::Index channel, const Interval& stretch) const;
-  Interval counted(const Segment& segment) const;
+  Interval counted(const MotionBasis::Phase& phase) const;
   Eigen::MatrixXd motion_output_columns(const Linearised& lin, Eigen::Index channel, const Interval& samples) const;
   Eigen::VectorXd initial_state(const Eigen::VectorXd& linear, Eigen::Index states) const;
   void prepare_angle_rows();
@@ -219,7 +216,7 @@ class RunResidual {
   Conditions conditions_;
   std::vector<std::string> channels_;
   MotionBasis motion_;
-  std::vector<Segment> segments_;
+  std::vector<MotionBasis::Phase> phases_;
   Eigen::MatrixXd measured_;  ///< samples x channels, missing samples 0
   Eigen::MatrixXd weight_;    ///< 1 / sigma, 0 where left out
   std::vector<double> sigma_;

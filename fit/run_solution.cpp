@@ -28,12 +28,6 @@ MatrixXd power(MatrixXd base, Index exponent) {
   return result;
 }
 
-/// A shaft that has come to rest stands exactly still: the rounding of its acceleration, eps/dt^3 of a spline, would turn it on with the square of the time.
-void stand_still(MatrixXd& state, Index motion, const RowVectorXd& angle) {
-  state.row(motion) = angle;
-  state.middleRows(motion + 1, 2).setZero();
-}
-
 }  // namespace
 
 VectorXd RunResidual::initial_state(const VectorXd& linear, Index states) const {
@@ -42,11 +36,11 @@ VectorXd RunResidual::initial_state(const VectorXd& linear, Index states) const 
   return state;
 }
 
-Interval RunResidual::counted(const Segment& segment) const { return {segment.samples.first, std::min(segment.samples.last, last_sample_)}; }
+Interval RunResidual::counted(const MotionBasis::Phase& phase) const { return {phase.samples.first, std::min(phase.samples.last, last_sample_)}; }
 
 std::shared_ptr<RunResidual::Linearised> RunResidual::linearise(const VectorXd& theta) const {
   auto lin = std::make_shared<Linearised>();
-  lin->system = model_->system(conditions_, theta, channels_);
+  lin->system = searched_system(theta);
   for (DualMatrix* m : {&lin->system.A, &lin->system.B, &lin->system.C, &lin->system.D}) m->partial.clear();
   lin->step = step_to_follow(lin->system, run_->dt);
   if (lin->system.feedback.empty()) prepare_linear(*lin);
@@ -58,7 +52,7 @@ void RunResidual::prepare_linear(Linearised& lin) const {
   if (inputs_.cols() > 0)
     lin.known = drive(lin.system, lin.step, DualMatrix(MatrixXd::Zero(lin.system.states(), 1)), run_->samples(), {}, inputs_, Partials::none).output;
   Index longest_rest = 0, longest_motion = 0;
-  for (const Segment& s : segments_) {
+  for (const MotionBasis::Phase& s : phases_) {
     Index& longest = s.moving ? longest_motion : longest_rest;
     longest = std::max(longest, counted(s).length());
   }
@@ -73,7 +67,7 @@ void RunResidual::prepare_linear(Linearised& lin) const {
   }
 }
 
-/// d output / d motion unknowns over a segment in which the shaft moves, of the splines that begin in it: the response to one spline, shifted.
+/// d output / d motion unknowns over a phase in which the shaft moves, of the splines that begin in it: the response to one spline, shifted.
 MatrixXd RunResidual::motion_output_columns(const Linearised& lin, Index channel, const Interval& samples) const {
   const RowVectorXd unit = lin.system.C.value.row(channel) * lin.spline, summed = lin.system.C.value.row(channel) * lin.spline_summed;
   MatrixXd columns = MatrixXd::Zero(samples.length(), motion_.unknowns());
@@ -91,7 +85,7 @@ MatrixXd RunResidual::motion_output_columns(const Linearised& lin, Index channel
   return columns;
 }
 
-/// d state / d motion unknowns behind such a segment, of the same splines.
+/// d state / d motion unknowns behind such a phase, of the same splines.
 MatrixXd RunResidual::motion_state_columns(const Linearised& lin, const Interval& samples) const {
   MatrixXd columns = MatrixXd::Zero(lin.spline.rows(), motion_.unknowns());
   for (Index j = 0; j < motion_.unknowns(); ++j) {
@@ -108,11 +102,11 @@ MatrixXd RunResidual::motion_state_columns(const Linearised& lin, const Interval
   return columns;
 }
 
-/// d state / d c behind a segment, from that at its start.
-MatrixXd RunResidual::state_behind(const Linearised& lin, const Segment& segment, const Interval& samples, const MatrixXd& start) const {
+/// d state / d c behind a phase, from that at its start.
+MatrixXd RunResidual::state_behind(const Linearised& lin, const MotionBasis::Phase& phase, const Interval& samples, const MatrixXd& start) const {
   MatrixXd behind = power(lin.step.transition.value, samples.length()) * start;
-  if (segment.moving && motion_.unknowns() > 0) behind.leftCols(motion_.unknowns()) += motion_state_columns(lin, samples);
-  if (segment.moving && samples.last < run_->samples()) {
+  if (phase.moving && motion_.unknowns() > 0) behind.leftCols(motion_.unknowns()) += motion_state_columns(lin, samples);
+  if (phase.moving && samples.last < run_->samples()) {
     RowVectorXd angle = RowVectorXd::Zero(unknowns_);
     angle.head(motion_.unknowns()) = motion_.angle_columns({samples.last, samples.last + 1});
     stand_still(behind, lin.system.motion, angle);
@@ -214,19 +208,19 @@ const rest_rows::SmoothReadings& RunResidual::smooth_readings(Index channel, con
       .first->second;
 }
 
-/// All rows [c | y], those of segments at rest rotated and cut to what c can reach; solves for c.
+/// All rows [c | y], those of phases at rest rotated and cut to what c can reach; solves for c.
 void RunResidual::stack_rows(Linearised& lin) const {
   std::vector<MatrixXd> rows;
   double unreachable = 0;
   MatrixXd start = MatrixXd::Zero(lin.system.states(), unknowns_);
   for (std::size_t i = 0; i < free_.size(); ++i) start(free_[i], first_state_ + static_cast<Index>(i)) = 1;
-  for (const Segment& segment : segments_) {
-    const Interval s = counted(segment);
+  for (const MotionBasis::Phase& phase : phases_) {
+    const Interval s = counted(phase);
     if (s.length() <= 0) break;
-    const Index smooth = segment.moving ? s.last : smooth_from(lin, s, start);
+    const Index smooth = phase.moving ? s.last : smooth_from(lin, s, start);
     for (Index c = 0; c < measured_.cols(); ++c) {
-      run_rows::Block block{s, segment.moving, c, start, {}, smooth};
-      const MatrixXd reach = segment.moving ? reach_in_motion(lin, block) : reach_at_rest(lin, block);
+      run_rows::Block block{s, phase.moving, c, start, {}, smooth};
+      const MatrixXd reach = phase.moving ? reach_in_motion(lin, block) : reach_at_rest(lin, block);
       run_rows::Rotated rotated = rotated_readings(lin, block, unreachable);
       MatrixXd together(reach.rows(), unknowns_ + 1);
       together << reach, block.reached(rotated);
@@ -234,7 +228,7 @@ void RunResidual::stack_rows(Linearised& lin) const {
       rows.push_back(std::move(together));
       lin.blocks.push_back(std::move(block));
     }
-    start = state_behind(lin, segment, s, start);
+    start = state_behind(lin, phase, s, start);
   }
   rows.insert(rows.end(), angle_rows_.begin(), angle_rows_.end());
   lin.settle(rows, unknowns_, unreachable);
@@ -249,8 +243,16 @@ RunResidual::Solution RunResidual::solve(const VectorXd& theta) const {
   return {theta, lin->chi2, lin->linear, lin};
 }
 
-LinearSystem RunResidual::differentiable_system(const VectorXd& theta) const {
+/// The model's system, corners of its laws rounded where they have any.
+LinearSystem RunResidual::searched_system(const VectorXd& theta) const {
   LinearSystem system = model_->system(conditions_, theta, channels_);
+  for (Feedback& f : system.feedback)
+    if (f.rounded) f.law = f.rounded;
+  return system;
+}
+
+LinearSystem RunResidual::differentiable_system(const VectorXd& theta) const {
+  LinearSystem system = searched_system(theta);
   if (differentiated_.empty()) return system;
   for (DualMatrix* m : {&system.A, &system.B, &system.C, &system.D})
     for (Index j = 0; j < m->parameters(); ++j)
@@ -260,7 +262,7 @@ LinearSystem RunResidual::differentiable_system(const VectorXd& theta) const {
 
 namespace {
 
-/// What the parameters do to one channel over a segment at fixed c, beside its prediction: [d y / d theta | y].
+/// What the parameters do to one channel over a phase at fixed c, beside its prediction: [d y / d theta | y].
 MatrixXd slopes_and_prediction(const Response& response, const Response& known, const Interval& s, Index channel, Index parameters) {
   MatrixXd m = MatrixXd::Zero(response.output.rows(), parameters + 1);
   m.col(parameters) = response.output.col(channel);
@@ -275,7 +277,7 @@ MatrixXd slopes_and_prediction(const Response& response, const Response& known, 
 
 }  // namespace
 
-/// Follows the model with its partials through all segments at fixed c, and hands [d y / d theta | y] of each channel to `take`, piece by piece. Stretches that are
+/// Follows the model with its partials through all phases at fixed c, and hands [d y / d theta | y] of each channel to `take`, piece by piece. Stretches that are
 /// smooth in `blocks` are handed on as coefficients of polynomials; none where there are no blocks.
 void RunResidual::follow_partials(const VectorXd& theta, const VectorXd& linear, const std::vector<run_rows::Block>& blocks, const TakeRows& take) const {
   const LinearSystem system = differentiable_system(theta);
@@ -291,19 +293,19 @@ void RunResidual::follow_partials(const VectorXd& theta, const VectorXd& linear,
   state.value.col(0) = initial_state(linear, system.states());
   const Motion motion = motion_.unknowns() > 0 ? motion_of(motion_.coefficients(linear.head(motion_.unknowns())), run_->dt) : Motion{};
   std::size_t block = 0;
-  for (const Segment& segment : segments_) {
-    const Interval s = counted(segment);
+  for (const MotionBasis::Phase& phase : phases_) {
+    const Interval s = counted(phase);
     if (s.length() <= 0) break;
-    const Index length = segment.moving ? s.length() : rest_rows::stretch_samples;
+    const Index length = phase.moving ? s.length() : rest_rows::stretch_samples;
     for (Index first = s.first; first < s.last; first += length) {
       const Interval stretch{first, std::min(first + length, s.last)};
       const bool is_smooth = !blocks.empty() && blocks[block].is_smooth(stretch);
       if (is_smooth && !smooth) smooth.emplace(free);
       const Response response = is_smooth        ? smooth->from(state)
-                                : segment.moving ? drive(system, step, state, stretch.length(), motion.jerk.segment(first, stretch.length()), {}, Partials::all)
+                                : phase.moving ? drive(system, step, state, stretch.length(), motion.jerk.segment(first, stretch.length()), {}, Partials::all)
                                                  : free.from(state, stretch.length());
       state = response.end;
-      if (segment.moving && stretch.last < run_->samples()) stand_still(state.value, system.motion, motion.angle.segment(stretch.last, 1));
+      if (phase.moving && stretch.last < run_->samples()) stand_still(state.value, system.motion, motion.angle.segment(stretch.last, 1));
       for (Index c = 0; c < channels; ++c) {
         MatrixXd m = slopes_and_prediction(response, known, stretch, c, parameters);
         m.col(parameters) += linear[first_offset_ + c] * (is_smooth ? rest_rows::smooth_constant() : VectorXd::Ones(stretch.length()));
@@ -394,12 +396,12 @@ RunResidual::Prediction RunResidual::predict(const VectorXd& theta) const {
   DualMatrix state(MatrixXd::Zero(lin.system.states(), 1));
   state.value.col(0) = initial_state(p.linear, lin.system.states());
   const FreeResponse free(lin.system, lin.step, Partials::none);
-  for (const Segment& segment : segments_) {
-    const Interval& s = segment.samples;
-    const Response response = segment.moving ? drive(lin.system, lin.step, state, s.length(), p.motion.jerk.segment(s.first, s.length()), {}, Partials::none)
+  for (const MotionBasis::Phase& phase : phases_) {
+    const Interval& s = phase.samples;
+    const Response response = phase.moving ? drive(lin.system, lin.step, state, s.length(), p.motion.jerk.segment(s.first, s.length()), {}, Partials::none)
                                              : free.from(state, s.length());
     state = response.end;
-    if (segment.moving && s.last < run_->samples()) stand_still(state.value, lin.system.motion, p.motion.angle.segment(s.last, 1));
+    if (phase.moving && s.last < run_->samples()) stand_still(state.value, lin.system.motion, p.motion.angle.segment(s.last, 1));
     p.output.middleRows(s.first, s.length()) = response.output;
   }
   if (lin.known.size() > 0) p.output += lin.known;

@@ -7,11 +7,19 @@ namespace unrig {
 
 namespace {
 
-constexpr double rounding = 0.4;  // of a corner, as a share of the gap: no edge is sharper, and a search can follow its slopes
+constexpr double rounding = 0.1;  // of a corner, as a share of the gap, for searches to follow its slopes
 constexpr Eigen::Index steps = 8;  // within a sample, in which the section may cross the whole gap
 
-/// What the gap takes from the deflection: z within it, the gap beyond; between |z| = (1 -+ rounding) p0 along the parabola that joins both smoothly.
+/// What the gap takes from the deflection: z within it, the gap beyond.
 double gap(double z, const double* p, double& slope, double* partial) {
+  const bool inside = std::abs(z) < p[0];
+  slope = inside ? 1 : 0;
+  partial[0] = inside ? 0 : (z > 0 ? 1 : -1);
+  return std::clamp(z, -p[0], p[0]);
+}
+
+/// The same, but between |z| = (1 -+ rounding) p0 along the parabola that joins both smoothly.
+double rounded_gap(double z, const double* p, double& slope, double* partial) {
   const double half = p[0], width = rounding * half, beyond = std::abs(z) - half, side = z > 0 ? 1 : -1;
   if (std::abs(beyond) < width) {
     const double short_of = width - beyond;  // of where the corner ends
@@ -20,17 +28,14 @@ double gap(double z, const double* p, double& slope, double* partial) {
     partial[0] = side * (1 - short_of * (1 + rounding) / (2 * width) + short_of * short_of / (4 * width * half));
     return side * (half - short_of * short_of / (4 * width));
   }
-  const bool inside = beyond < 0;
-  slope = inside ? 1 : 0;
-  partial[0] = inside ? 0 : side;
-  return inside ? z : side * half;
+  return gap(z, p, slope, partial);
 }
 
 }  // namespace
 
 /// A gap in the torsional drive: the elastic couple acts on the twist beyond the gap only, M = -k (theta - clamp(theta, -delta, delta)), theta the elastic twist [rad] of
-/// the section in the first torsional mode, delta half the gap [rad], k that mode's stiffness; the corners are rounded, from 0.6 to 1.4 delta. The gap is centred where the
-/// rig stood before the run.
+/// the section in the first torsional mode, delta half the gap [rad], k that mode's stiffness; a fit rounds the corners from 0.9 to 1.1 delta. The gap is centred where
+/// the rig stood before the run.
 /// Source: E. H. Dowell et al., A Modern Course in Aeroelasticity (2015), chapter 11.
 Effect freeplay() {
   Effect e;
@@ -53,7 +58,7 @@ Effect freeplay() {
     direction.add_partial(stiffness, port(system, c.ports.coordinate + first, omega * omega / shape).value);
     Eigen::RowVectorXd twist = Eigen::RowVectorXd::Zero(system.coordinates);
     twist[first] = shape;
-    append_feedback(system, direction, {displacement_of(system, twist), c.first_parameter, 1, gap, steps});
+    append_feedback(system, direction, {displacement_of(system, twist), c.first_parameter, 1, gap, rounded_gap, steps});
   };
   return e;
 }

@@ -34,7 +34,7 @@ MatrixXd behind_a_gap(double delta, Index steps_per_sample, Index samples) {
   system.C = DualMatrix(MatrixXd::Identity(2, 2));
   system.D = DualMatrix(MatrixXd::Zero(2, 1));
   system.coordinates = 1;
-  system.feedback.push_back({Eigen::RowVector2d(1, 0), 0, 1, sharp_gap, steps_per_sample});
+  system.feedback.push_back({Eigen::RowVector2d(1, 0), 0, 1, sharp_gap, nullptr, steps_per_sample});
   const VectorXd theta = VectorXd::Constant(1, delta);
   return follow(system, step_to_follow(system, dt), theta, {Eigen::Vector2d(1, 0), {}, {}, MatrixXd(2, 0), {}}, samples, Partials::none).output;
 }
@@ -63,21 +63,23 @@ TEST(NonlinearResponse, AGapKeepsEnergyAndPeriod) {
   EXPECT_NEAR((crossings[periods] - crossings[0]) / periods / exact, 1, 1e-3) << "a loss of 1 % would change it by 0.1 %";
 }
 
-TEST(NonlinearResponse, FreeplaysLawIsAGapWithRoundedCorners) {
+TEST(NonlinearResponse, FreeplayIsAGapWhoseCornersASearchRounds) {
   const Rig rig = read_rig(test::null_campaign("rig.toml"));
   const AeroelasticModel model = AeroelasticModel(rig, make_basis(rig, Index{1}, Index{1}), wagner(Wagner::jones)).with_effects({"freeplay"});
   Conditions conditions;
   conditions.density = 1.2;
   const LinearSystem system = model.system(conditions, model.start_values(), {"gauge"});
   ASSERT_EQ(system.feedback.size(), 1u);
-  const auto law = system.feedback.front().law;
+  const auto law = system.feedback.front().rounded;
+  const auto sharp_law = system.feedback.front().law;
   const double half = 2e-3, h = 1e-9;
   double slope = 0, ignored = 0, partial[1] = {}, none[1] = {};
   const auto at = [&](double z, double gap) { return law(z, &gap, ignored, none); };
   for (double z = -3 * half; z <= 3 * half; z += 0.0317 * half) {
     const double value = law(z, &half, slope, partial), sharp = std::clamp(z, -half, half);
-    const bool corner = std::abs(std::abs(z) - half) < 0.41 * half;
-    EXPECT_LE(std::abs(value - sharp), corner ? 0.11 * half : 1e-18) << z << ": a corner of width w is cut by w/4 at most";
+    const bool corner = std::abs(std::abs(z) - half) < 0.101 * half;
+    EXPECT_LE(std::abs(value - sharp), corner ? 0.0251 * half : 1e-18) << z << ": a corner of half width w is cut by w/4 at most";
+    EXPECT_EQ(sharp_law(z, &half, ignored, none), sharp) << z;
     EXPECT_NEAR(slope, (at(z + h, half) - at(z - h, half)) / (2 * h), 1e-5) << z;
     EXPECT_NEAR(partial[0], (at(z, half + h) - at(z, half - h)) / (2 * h), 1e-5) << z;
     EXPECT_EQ(value, -at(-z, half)) << z;
