@@ -8,7 +8,7 @@ set -eu
 cd "$(dirname "$0")/.."
 
 packages="cmake g++ make ninja-build pkg-config
-  libeigen3-dev libceres-dev libfftw3-dev libudunits2-dev libtomlplusplus-dev nlohmann-json3-dev libcli11-dev libfmt-dev libfast-float-dev libmatio-dev libjs-dygraphs
+  libeigen3-dev libceres-dev libfftw3-dev libudunits2-dev libtomlplusplus-dev nlohmann-json3-dev libcli11-dev libfmt-dev libfast-float-dev libmatio-dev zlib1g-dev libjs-dygraphs
   libgtest-dev libgmock-dev libbenchmark-dev"
 optional="ccache chromium python3-numpy python3-scipy"
 

@@ -10,7 +10,8 @@
 
 #include "core/import/bridge.h"
 #include "core/import/delimited.h"
-#include "core/import/mat.h"
+#include "core/import/mat5.h"
+#include "core/import/mat73.h"
 #include "core/import/tdms.h"
 #include "core/import/uff.h"
 #include "core/run.h"
@@ -183,9 +184,11 @@ Imported import_recording(const Recording& recording, const std::string& mapping
 Recording read_recording(const std::string& path, const std::string& mapping_text, const std::string& mapping_file) {
   const std::string bytes = read_text(path);
   const TomlTable mapping = parse_mapping(mapping_text, mapping_file);
-  const bool hdf5 = bytes.starts_with("\x89HDF\r\n") || (bytes.size() > 520 && bytes.compare(512, 4, "\x89HDF") == 0);
   if (bytes.starts_with("TDSm")) return read_tdms(bytes, path);
-  if (bytes.starts_with("MATLAB") || hdf5) return read_mat(path);
+  if (bytes.size() > 520 && bytes.compare(512, 4, "\x89HDF") == 0) return read_mat73(path);
+  if (bytes.starts_with("MATLAB")) return read_mat5(bytes, path);
+  for (const auto& [start, what] : {std::pair{"\x89HDF", "this HDF5 file is not MATLAB's (Octave's `save -hdf5` writes such)"}, {"Octave-1-", "the file is in Octave's own binary format"}, {"# Created by Octave", "the file is in Octave's own text format"}})
+    if (bytes.starts_with(start)) throw InputError({path, 0}, what, "wanted a MATLAB file of version 5 or 7.3", "Save it again with `save -v7 FILE`.");
   const std::string_view first = std::string_view(bytes).substr(0, bytes.find('\n'));
   if (first.find_first_not_of(" \r") != std::string_view::npos && first.substr(first.find_first_not_of(" ")).starts_with("-1") && first.size() <= 82 && first.find_first_of(",;\t") == std::string_view::npos)
     return read_uff(bytes, path);

@@ -46,15 +46,20 @@ int import_command(int argc, char** argv) {
   }
   if (!list && (map.empty() || output.empty())) throw InputError({path, 0}, "--map or --output is missing", "wanted both, or --list", "`unrig import --help` shows an example.");
   const std::string mapping = map.empty() ? "unrig_import = 1\n" : read_text(map);
+  Progress progress;
+  progress("reading " + path);
   const Recording recording = read_recording(path, mapping, map);
   if (list) {
+    progress.clear();
     for (const std::string& warning : recording.warnings) warn(warning);
     list_channels(recording);
     return exit_done;
   }
+  progress("writing " + output);
   const Imported imported = import_recording(recording, mapping, map);
-  for (const std::string& warning : imported.warnings) warn(warning);
   write_text(output, imported.text);
+  progress.clear();
+  for (const std::string& warning : imported.warnings) warn(warning);
   fmt::print("{}: {} samples\n", output, imported.samples);
   for (const std::string& column : imported.columns) fmt::print("  {}\n", column);
   return exit_done;

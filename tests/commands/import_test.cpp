@@ -7,6 +7,7 @@
 #include <filesystem>
 
 #include "core/run.h"
+#include "core/text_file.h"
 #include "tests/commands/run_unrig.h"
 
 namespace unrig {
@@ -38,6 +39,34 @@ TEST(ImportCommand, ReadsWhatSciPyWrote) {
   const Finished listed = run_unrig(directory, {"import", directory.path("packed.mat"), "--list"});
   EXPECT_THAT(listed.out, HasSubstr("data.n"));
   EXPECT_THAT(listed.out, HasSubstr("UNSCALED"));
+}
+
+TEST(ImportCommand, ReadsWhatOctaveWroteForMatlabAndNamesItsOwnFormats) {
+  if (std::system("octave-cli --version >/dev/null 2>&1") != 0) GTEST_SKIP() << "no GNU Octave on this machine (Debian: octave)";
+  const TemporaryDirectory directory;
+  const std::string script = "x = sin((0:999)' / 7); n = 0:999; data.load = single(x); data.part(2).n = int16(n); text = 'abc'; z = x + i; flags = x > 0;\n"
+                             "for kind = {'v7', 'v6', 'hdf5', 'binary', 'text'}\n  save(['-' kind{1}], [kind{1} '.mat'], 'x', 'n', 'data', 'text', 'z', 'flags')\nend\n";
+  ASSERT_EQ(std::system(("cd " + directory.path("") + " && octave-cli --quiet --no-init-file " + directory.file("write.m", script) + " 2>" + directory.path("octave")).c_str()), 0) << read_text(directory.path("octave"));
+  for (const std::string name : {"v7.mat", "v6.mat"}) {
+    for (const std::string source : {"x", "data.load", "n"}) {
+      const Finished finished = run_unrig(directory, {"import", directory.path(name), "--map", directory.file("map.toml", map + source + "\"\nunit = \"N\"\n"), "-o", directory.path("run.csv")});
+      ASSERT_EQ(finished.status, 0) << finished.err;
+      const unrig::Run run = read_run(directory.path("run.csv"));
+      ASSERT_EQ(run.samples(), 1000);
+      for (Eigen::Index k = 0; k < 1000; ++k)
+        EXPECT_NEAR(run.channel("gauge").value[k], source == "n" ? static_cast<double>(k) : std::sin(static_cast<double>(k) / 7), source == "x" ? 1e-12 : 6e-8);  // digits written; single precision
+    }
+    const Finished listed = run_unrig(directory, {"import", directory.path(name), "--list"});
+    EXPECT_THAT(listed.out, HasSubstr("data.part(2).n                      1000 samples, UNSCALED"));
+    EXPECT_THAT(listed.err, HasSubstr("z is left out: its numbers are complex"));
+    EXPECT_THAT(listed.err, HasSubstr("text is left out: it holds no numbers"));
+  }
+  for (const std::string name : {"hdf5.mat", "binary.mat", "text.mat"}) {
+    const Finished finished = run_unrig(directory, {"import", directory.path(name), "--list"});
+    EXPECT_EQ(finished.status, 2) << name;
+    EXPECT_THAT(finished.err, HasSubstr("Octave")) << name;
+    EXPECT_THAT(finished.err, HasSubstr("`save -v7 FILE`")) << name;
+  }
 }
 
 TEST(ImportCommand, RefusesAndLeavesNothingBehind) {

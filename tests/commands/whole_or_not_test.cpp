@@ -19,9 +19,9 @@ using test::run_unrig;
 using test::TemporaryDirectory;
 using ::testing::HasSubstr;
 
-/// `unrig simulate` of a step with this output, under shell settings such as limits. Returns the shell's exit status.
-int simulate(const std::string& settings, const std::string& output, const TemporaryDirectory& directory) {
-  const std::string command = settings + " exec " UNRIG_BINARY " simulate --rig " + null_campaign("rig.toml") + " --run " + null_campaign("step_a.csv") + " -o " + output + " >/dev/null 2>" + directory.path("err");
+/// `unrig simulate` of a step with this output, under shell settings such as limits, by a program such as setpriv. Returns the shell's exit status.
+int simulate(const std::string& settings, const std::string& output, const TemporaryDirectory& directory, const std::string& by = "") {
+  const std::string command = settings + " exec " + by + UNRIG_BINARY " simulate --rig " + null_campaign("rig.toml") + " --run " + null_campaign("step_a.csv") + " -o " + output + " >/dev/null 2>" + directory.path("err");
   const int status = std::system(("sh -c \"" + command + "\"").c_str());
   return WIFEXITED(status) ? WEXITSTATUS(status) : -1;
 }
@@ -61,6 +61,26 @@ TEST(WholeOrNot, AFolderThatCannotBeWrittenIsAnError) {
     EXPECT_EQ(simulate("", output, directory), 2) << output;
     EXPECT_THAT(read_text(directory.path("err")), HasSubstr("cannot be written")) << output;
   }
+}
+
+TEST(WholeOrNot, AReadOnlyFolderIsAnErrorAndKeepsTheOldFile) {
+  namespace fs = std::filesystem;
+  // Permission bits do not bind root.
+  const std::string by = ::geteuid() == 0 ? "setpriv --reuid=65534 --regid=65534 --clear-groups " : "";
+  if (std::system((by + "test -x " UNRIG_BINARY " -a -r " + null_campaign("rig.toml") + " 2>/dev/null").c_str()) != 0)
+    GTEST_SKIP() << "root can take on no other user here who may read the build and the sample data";
+  const TemporaryDirectory directory;
+  fs::create_directory(directory.path("out"));
+  const std::string old = directory.file("out/run.csv", "the old one");
+  fs::permissions(old, fs::perms(0666));  // even a file that may be written cannot be replaced
+  fs::permissions(directory.path("out"), fs::perms(0555));
+  for (const std::string& output : {old, directory.path("out/new.csv")}) {
+    EXPECT_EQ(simulate("", output, directory, by), 2) << output;
+    EXPECT_THAT(read_text(directory.path("err")), HasSubstr(output + ": the file cannot be written: Permission denied"));
+  }
+  EXPECT_EQ(read_text(old), "the old one");
+  EXPECT_EQ(files_in(directory.path("out")), 1u);
+  fs::permissions(directory.path("out"), fs::perms(0755));  // so that it can be removed
 }
 
 /// A step run of that many samples.

@@ -11,7 +11,6 @@
 
 #include "core/error.h"
 #include "core/import/delimited.h"
-#include "core/import/mat.h"
 #include "core/run.h"
 #include "tests/support/temporary_directory.h"
 
@@ -146,12 +145,14 @@ void write_mat(const std::string& path, mat_ft version) {
   Mat_Close(file);
 }
 
+Recording recording_in(const std::string& path) { return read_recording(path, "unrig_import = 1\n", "map.toml"); }
+
 TEST(Mat, ReadsBothVersions) {
   const TemporaryDirectory directory;
   for (const mat_ft version : {MAT_FT_MAT5, MAT_FT_MAT73}) {
     const std::string path = directory.path("lab.mat");
     write_mat(path, version);
-    const Recording r = read_mat(path);
+    const Recording r = recording_in(path);
     ASSERT_EQ(r.channels.size(), 5u);
     std::map<std::string, RecordedChannel> by_name;  // HDF5 sorts them
     for (const RecordedChannel& c : r.channels) by_name[c.name] = c;
@@ -166,8 +167,8 @@ TEST(Mat, ReadsBothVersions) {
 
 TEST(Mat, RefusesWhatCannotBeRead) {
   const TemporaryDirectory directory;
-  EXPECT_THAT(complaint([&] { read_mat(directory.path("absent.mat")); }), HasSubstr("cannot be read"));
-  EXPECT_THAT(complaint([&] { read_mat(directory.file("text.mat", "MATLAB is not here")); }), HasSubstr("no MATLAB file"));
+  EXPECT_THAT(complaint([&] { recording_in(directory.path("absent.mat")); }), HasSubstr("cannot be read"));
+  EXPECT_THAT(complaint([&] { recording_in(directory.file("text.mat", "MATLAB is not here")); }), HasSubstr("no MATLAB file"));
   write_mat(directory.path("whole.mat"), MAT_FT_MAT5);
   const std::string whole = [&] {
     std::ifstream file(directory.path("whole.mat"), std::ios::binary);
@@ -176,7 +177,7 @@ TEST(Mat, RefusesWhatCannotBeRead) {
   for (const std::size_t length : {whole.size() / 2, std::size_t(128), std::size_t(140)}) {
     const std::string path = directory.file("cut.mat", whole.substr(0, length));
     const std::string said = complaint([&] {
-      const Recording r = read_mat(path);
+      const Recording r = recording_in(path);
       for (const RecordedChannel& c : r.channels) EXPECT_EQ(c.value.size(), 3u) << c.name;  // what is handed on is whole
     });
     if (length <= 140) {

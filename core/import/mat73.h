@@ -1,0 +1,12 @@
+#pragma once
+#include <string>
+
+#include "core/import/recording.h"
+
+namespace unrig {
+
+/// Reads the numeric variables of a MATLAB file of version 7.3 by libmatio and HDF5; channels and what is left out as in mat5.h.
+/// Throws InputError where the file cannot be read as such.
+Recording read_mat73(const std::string& path);
+
+}  // namespace unrig
