@@ -1,5 +1,7 @@
 #include "fit/effect_option.h"
 
+#include <fmt/format.h>
+
 #include <stdexcept>
 
 #include "core/effects/effect.h"
@@ -13,6 +15,12 @@ std::vector<std::string> effects_of_option(const std::string& option, const std:
   return known;
 } catch (const std::invalid_argument& e) {
   throw InputError({option, 0}, e.what(), "wanted one of these", "");
+}
+
+std::string effect_list() {
+  std::string list = "Effects:\n";
+  for (const Effect& e : effects()) list += fmt::format("  {:<20}{}\n", e.id, e.summary);
+  return list;
 }
 
 }  // namespace unrig
