@@ -31,8 +31,8 @@ int import_command(int argc, char** argv) {
   app.footer(
       "Example:\n  unrig import step.tdms --list\n  unrig import step.tdms --map map.toml -o step.csv\n\nwith a map.toml such as\n"
       "  unrig_import = 1\n  [run]\n  kind = \"step\"\n  medium = \"water\"\n  density = \"998.2 kg/m^3\"\n  speed = \"0.6 m/s\"\n  calibration = \"4.4 N/V\"\n"
-      "  [time]                       # left out where the file gives the sampling of its channels\n  rate = \"500 Hz\"             # or: source = \"Time\", unit = \"s\"\n"
-      "  [[column]]\n  name = \"alpha\"\n  source = \"Rig/Angle\"         # as --list shows it\n  unit = \"deg\"                # where the file gives none\n"
+      "  [time]                       # left out where the file gives the sampling of its channels\n  rate = \"500 Hz\"              # or: source = \"Time\", unit = \"s\"\n"
+      "  [[column]]\n  name = \"alpha\"\n  source = \"Rig/Angle\"         # as --list shows it\n  unit = \"deg\"                 # where the file gives none\n"
       "  [[column]]\n  name = \"gauge\"\n  source = \"Rig/Bridge\"\n  unit = \"V\"\n"
       "  # raw = true                 # takes unscaled converter counts, for a calibration in N per count\n"
       "  # bridge.kind = \"full-1\"     # volts to strain: quarter-1, quarter-2, half-1, half-2, full-1, full-2, full-3,\n"

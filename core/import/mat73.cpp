@@ -1,13 +1,23 @@
 #include "core/import/mat73.h"
 
+#include <fmt/format.h>
 #include <matio.h>
+#include <sys/mman.h>
+#include <sys/wait.h>
+#include <unistd.h>
 
 #include <algorithm>
+#include <cerrno>
+#include <cstring>
 #include <filesystem>
 #include <memory>
+#include <optional>
+#include <stdexcept>
 
 #include "core/error.h"
+#include "core/import/byte_reader.h"
 #include "core/import/matlab_matrix.h"
+#include "core/text_file.h"
 
 namespace unrig {
 namespace {
@@ -81,28 +91,99 @@ double claimed_bytes(const matvar_t& v, int depth = 0) {
   return sum;
 }
 
-}  // namespace
-
-Recording read_mat73(const std::string& path) {
+/// Nothing where this is no such file.
+std::optional<Recording> read_here(const std::string& path) {
   Mat_LogInitFunc("unrig", be_quiet);
-  const auto refuse = [&](const std::string& what) -> InputError { return {{path, 0}, what, "wanted a MATLAB file of version 5 or 7.3", "Save it again with `save(..., '-v7')`."}; };
   const std::unique_ptr<mat_t, CloseMat> file(Mat_Open(path.c_str(), MAT_ACC_RDONLY));
-  if (!file) throw refuse("this is no MATLAB file of version 7.3");
+  if (!file) return std::nullopt;
   Recording out{path, "MAT", {}, {}};
   constexpr double densest = 1032;  // bytes that a byte of deflate can become (RFC 1951: 258 for two bits)
   const double most = densest * static_cast<double>(std::filesystem::file_size(path));
   while (const std::unique_ptr<matvar_t, FreeVariable> variable{Mat_VarReadNextInfo(file.get())}) {
     const std::string name = variable->name ? variable->name : "";
-    if (claimed_bytes(*variable) > most) {
+    if (claimed_bytes(*variable) > most)
       leave_out(name, "it claims to be larger than the file can hold", out);
-      continue;
-    }
-    if (Mat_VarReadDataAll(file.get(), variable.get()) != 0) {
+    else if (Mat_VarReadDataAll(file.get(), variable.get()) != 0)
       leave_out(name, "it cannot be read", out);
-      continue;
-    }
-    take(*variable, name, 0, out);
+    else
+      take(*variable, name, 0, out);
   }
+  return out;
+}
+
+template <class T>
+void put(std::string& bytes, const T* numbers, std::size_t count) {
+  bytes.append(reinterpret_cast<const char*>(numbers), count * sizeof(T));
+}
+
+void put(std::string& bytes, const std::string& text) {
+  const auto size = static_cast<std::uint32_t>(text.size());
+  put(bytes, &size, 1);
+  bytes += text;
+}
+
+/// For the other process: channels with name, reason for being raw, and values; then the warnings.
+std::string packed(const Recording& recording) {
+  std::string bytes;
+  const std::uint64_t counts[]{recording.channels.size(), recording.warnings.size()};
+  put(bytes, counts, 2);
+  for (const RecordedChannel& channel : recording.channels) {
+    put(bytes, channel.name);
+    put(bytes, channel.raw);
+    const std::uint64_t samples = channel.value.size();
+    put(bytes, &samples, 1);
+    put(bytes, channel.value.data(), channel.value.size());
+  }
+  for (const std::string& warning : recording.warnings) put(bytes, warning);
+  return bytes;
+}
+
+Recording unpacked(const std::string& bytes, const std::string& path) {
+  ByteReader from(bytes, std::endian::native == std::endian::big);
+  Recording out{path, "MAT", {}, {}};
+  const auto channels = from.number<std::uint64_t>(), warnings = from.number<std::uint64_t>();
+  for (std::uint64_t c = 0; c < channels; ++c) {
+    RecordedChannel channel{from.text(), "", {}, "", 0, 0};
+    channel.raw = from.text();
+    channel.value.resize(from.number<std::uint64_t>());
+    const std::string_view values = from.take(channel.value.size() * sizeof(double));
+    std::memcpy(channel.value.data(), values.data(), values.size());
+    out.channels.push_back(std::move(channel));
+  }
+  for (std::uint64_t w = 0; w < warnings; ++w) out.warnings.push_back(from.text());
+  return out;
+}
+
+enum ChildStatus { child_done = 0, child_no_file = 3 };
+
+}  // namespace
+
+Recording read_mat73(const std::string& path) {
+  const auto refuse = [&](const std::string& what) -> InputError { return {{path, 0}, what, "wanted a MATLAB file of version 5 or 7.3", "Save it again with `save(..., '-v7')`."}; };
+  const int shared = memfd_create("unrig", MFD_CLOEXEC);
+  const struct Close {
+    int file;
+    ~Close() { ::close(file); }
+  } close{shared};
+  const pid_t child = shared < 0 ? -1 : ::fork();
+  if (child < 0) throw std::runtime_error("no second process can be started");
+  const std::string handed = fmt::format("/proc/self/fd/{}", shared);
+  if (child == 0) {
+    int status = 1;
+    try {
+      const std::optional<Recording> found = read_here(path);
+      if (found) write_text(handed, packed(*found));
+      status = found ? child_done : child_no_file;
+    } catch (...) {  // the status says that something went wrong
+    }
+    ::_exit(status);
+  }
+  int status = 0;
+  while (::waitpid(child, &status, 0) < 0 && errno == EINTR) {
+  }
+  if (WIFEXITED(status) && WEXITSTATUS(status) == child_no_file) throw refuse("this is no MATLAB file of version 7.3");
+  if (!WIFEXITED(status) || WEXITSTATUS(status) != child_done) throw refuse("the file is damaged: libmatio, which reads it, broke down");
+  Recording out = unpacked(read_text(handed), path);
   if (out.channels.empty()) throw refuse("the file holds no variable with real numbers");
   return out;
 }

@@ -9,6 +9,7 @@
 #include "core/run.h"
 #include "core/text_file.h"
 #include "tests/commands/run_unrig.h"
+#include "tests/support/sample_data.h"
 
 namespace unrig {
 namespace {
@@ -67,6 +68,13 @@ TEST(ImportCommand, ReadsWhatOctaveWroteForMatlabAndNamesItsOwnFormats) {
     EXPECT_THAT(finished.err, HasSubstr("Octave")) << name;
     EXPECT_THAT(finished.err, HasSubstr("`save -v7 FILE`")) << name;
   }
+}
+
+TEST(ImportCommand, SurvivesAFileAtWhichHdf5BreaksDown) {
+  const TemporaryDirectory directory;
+  const Finished finished = run_unrig(directory, {"import", test::source_path("tests/fuzz/corpus/mat73/ends_hdf5.mat"), "--list"});
+  EXPECT_EQ(finished.status, 2);
+  EXPECT_THAT(finished.err, HasSubstr("libmatio, which reads it, broke down"));
 }
 
 TEST(ImportCommand, RefusesAndLeavesNothingBehind) {
