@@ -10,5 +10,5 @@ cd "$(dirname "$0")/.."
 sh sample_data/setup.sh
 cmake -S . -B build/sanitize -G Ninja --log-level=WARNING -DUNRIG_SANITIZE=ON
 CMAKE_BUILD_PARALLEL_LEVEL=${CMAKE_BUILD_PARALLEL_LEVEL:-$(nproc)} cmake --build build/sanitize
-export UBSAN_OPTIONS=print_stacktrace=1 CTEST_PARALLEL_LEVEL="${CTEST_PARALLEL_LEVEL:-$(nproc)}"
+export UBSAN_OPTIONS=print_stacktrace=1 LSAN_OPTIONS="suppressions=$PWD/tests/known_leaks.txt:print_suppressions=0" CTEST_PARALLEL_LEVEL="${CTEST_PARALLEL_LEVEL:-$(nproc)}"
 exec ctest --test-dir build/sanitize --output-on-failure --no-tests=error ${1:+-R "$1"}
