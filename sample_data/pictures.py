@@ -84,8 +84,6 @@ def correction(work, picture):
         axes.grid(color="0.9", lw=0.6)
         axes.set_axisbelow(True)
     figure.savefig(picture, dpi=130)
-    inside = (t > 0.5) & (t < 8)
-    print(f"{picture}: r.m.s. from 0.5 to 8 semichords {100 * np.sqrt(np.mean((load - true)[inside] ** 2)) / step:.2f} % of the step, raw reading {100 * np.sqrt(np.mean((raw - true)[inside] ** 2)) / step:.0f} %")
 
 
 def diagnosis(work, picture):
@@ -121,7 +119,6 @@ def diagnosis(work, picture):
     axes["ranking"].axvline(1, color=BLACK, lw=1, ls=(0, (4, 3)))
     axes["ranking"].set(xscale="log", xlim=(0.5, 12 * max(chi2)), xlabel="reduced chi-square\n(1: only noise is left)", title="the effects fitted")
     figure.savefig(picture, dpi=130)
-    print(f"{picture}: {said['verdict']}")
 
 
 if __name__ == "__main__":
