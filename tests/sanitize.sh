@@ -4,6 +4,9 @@
 #   sh tests/sanitize.sh            the whole suite
 #   sh tests/sanitize.sh REGEX      the tests whose names match, as `ctest -R` takes it
 #
+# 2026-11-22: the 289 tests of core passed, in 68 s one after the other, with no finding (of this build only `--target test_core`, then `ctest -R '^core\.'`).
+# The other floors, commands and studies have not been run yet.
+#
 # CMAKE_BUILD_PARALLEL_LEVEL and CTEST_PARALLEL_LEVEL set how many jobs run at once; otherwise as many as there are processors.
 set -eu
 cd "$(dirname "$0")/.."

@@ -73,8 +73,11 @@ TEST(ImportCommand, ReadsWhatOctaveWroteForMatlabAndNamesItsOwnFormats) {
 TEST(ImportCommand, SurvivesAFileAtWhichHdf5BreaksDown) {
   const TemporaryDirectory directory;
   const Finished finished = run_unrig(directory, {"import", test::source_path("tests/fuzz/corpus/mat73/ends_hdf5.mat"), "--list"});
-  EXPECT_EQ(finished.status, 2);
-  EXPECT_THAT(finished.err, HasSubstr("libmatio, which reads it, broke down"));
+  ASSERT_NE(finished.status, -1) << "it ended by a signal";
+  if (finished.status != 0) {  // another HDF5 than Debian 12's may get on with it
+    EXPECT_EQ(finished.status, 2);
+    EXPECT_THAT(finished.err, HasSubstr("libmatio, which reads it, broke down"));
+  }
 }
 
 TEST(ImportCommand, RefusesAndLeavesNothingBehind) {
