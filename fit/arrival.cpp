@@ -14,6 +14,10 @@
 #include "fit/undetermined.h"
 
 namespace unrig {
+
+bool belongs_to_an_effect(const std::string& parameter) {
+  return std::any_of(effects().begin(), effects().end(), [&](const Effect& e) { return parameter.starts_with(e.id + "."); });
+}
 namespace {
 
 using Eigen::Index;
@@ -103,10 +107,6 @@ Arrival grow(Arrival start, const FitProblem& problem, const ArrivalEffort& effo
   if (!effort.other_starts || horizons.size() < 2 || arrival.reduced_chi2() < explained) return arrival;
   Arrival other = try_other_starts(start, problem, horizons, effort);
   return other.reduced_chi2() < arrival.reduced_chi2() ? other : arrival;
-}
-
-bool belongs_to_an_effect(const std::string& parameter) {
-  return std::any_of(effects().begin(), effects().end(), [&](const Effect& e) { return parameter.starts_with(e.id + "."); });
 }
 
 void set_starts(JointProblem& joint, const std::map<std::string, double>& starts) {

@@ -50,6 +50,9 @@ void solve(Arrival& arrival, const JointProblem::SolveOptions& options = {});
 /// Noise levels from what the model leaves, spikes, and windows of the motion that the gauge asks to be wider; solves again after each.
 void refine(Arrival& arrival, const FitProblem& problem);
 
+/// Whether a parameter of this name is some effect's.
+bool belongs_to_an_effect(const std::string& parameter);
+
 /// The unknowns that belong to effect `id`.
 std::vector<Unknown*> unknowns_of(JointProblem& joint, const std::string& id);
 

@@ -1,10 +1,14 @@
 #include "fit/decays_first.h"
 
+#include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
 #include <memory>
+#include <utility>
 
 #include "core/in_parallel.h"
+#include "fit/arrival.h"
+#include "fit/law_smoother.h"
 #include "fit/least_squares.h"
 
 namespace unrig {
@@ -16,10 +20,151 @@ using Eigen::VectorXd;
 
 bool is_decay(const RunResidual& run) { return run.motion().unknowns() == 0; }
 
+/// A fit that cannot follow leaves parameters far from the truth: those more than a factor two from the rig file's go back there.
+void back_to_the_rig(JointProblem& joint) {
+  const VectorXd rig = joint.model().start_values();
+  for (Unknown& u : joint.unknowns()) {
+    const double there = rig[u.parameter];
+    if (u.run < 0 && !u.held && there > 0 && std::abs(std::log(u.value / there)) > std::log(2.0) && !belongs_to_an_effect(joint.parameter(u).name)) u.value = there;
+  }
+}
+
+/// theta and the decays' trajectories, with laws that are trusted more and more (fit/law_smoother.h).
+class GrowingTrust {
+ public:
+  GrowingTrust(const GrowingTrust&) = delete;  // the smoothers look at its runs
+  GrowingTrust& operator=(const GrowingTrust&) = delete;
+
+  explicit GrowingTrust(JointProblem joint) : joint_(std::move(joint)) {
+    for (std::size_t i = 0; i < joint_.unknowns().size(); ++i)
+      if (const Unknown& u = joint_.unknowns()[i]; !u.held && u.run < 0) {
+        free_.push_back(i);
+        parameters_.push_back(u.parameter);
+      }
+    for (std::size_t r = 0; r < joint_.runs().size(); ++r) {
+      if (!is_decay(joint_.runs()[r])) continue;
+      decays_.push_back(r);
+      smoothers_.emplace_back(joint_.runs()[r], parameters_);
+      samples_ += static_cast<double>(smoothers_.back().samples());
+    }
+  }
+
+  /// Until the laws are trusted wholly, or leave more than the noise and more than they did.
+  void fit() {
+    constexpr int levels = 14, steps = 3;
+    constexpr double more_trust = 2.5, worse = 2;
+    begin();
+    for (level_ = 0; level_ < levels; ++level_) {
+      const VectorXd before = values();
+      for (int i = 0; i < steps; ++i) step(true);
+      const double now = cost();
+      if (!(now < worse * std::max(left_, samples_ / 4)) && level_ > 0) {
+        set(before);
+        return;
+      }
+      left_ = now;
+      linear_.clear();
+      for (const LawSmoother& s : smoothers_) linear_.push_back(s.linear());
+      trust(more_trust);
+    }
+  }
+
+  /// Whether this fit trusts its laws further, or as far and leaves less.
+  bool better_than(const GrowingTrust& other) const { return level_ != other.level_ ? level_ > other.level_ : left_ < other.left_; }
+
+  const JointProblem& joint() const { return joint_; }
+  /// c of the decays, in their order.
+  const std::vector<VectorXd>& linear() const { return linear_; }
+
+ private:
+  /// A first trajectory without laws, then sigma from what they are missed for; accelerations that no law explains count as less likely.
+  void begin() {
+    constexpr double ample = 4, beside = 0.1, least = 1e-6;
+    for (std::size_t d = 0; d < decays_.size(); ++d) sigma_.push_back(ample * smoothers_[d].enough_to_move(joint_.theta(decays_[d])));
+    share_sigma();
+    step(false);
+    for (std::size_t d = 0; d < decays_.size(); ++d) {
+      sigma_[d] = (2 * smoothers_[d].disturbance()).cwiseMax(least * sigma_[d]);
+      sigma_[d].tail(smoothers_[d].coordinates()) *= beside;
+    }
+    share_sigma();
+    constexpr int first_steps = 4;
+    for (int i = 0; i < first_steps; ++i) step(true);
+  }
+
+  /// Runs in which the same laws act trust them alike.
+  void share_sigma() {
+    for (VectorXd& a : sigma_)
+      for (const VectorXd& b : sigma_)
+        if (a.size() == b.size()) a = a.cwiseMax(b);
+  }
+
+  void trust(double more) {
+    for (std::size_t d = 0; d < decays_.size(); ++d) {
+      sigma_[d] /= more;
+      sigma_[d].tail(smoothers_[d].coordinates()) /= more;
+    }
+  }
+
+  /// One Gauss-Newton step of all trajectories and, where asked, of theta: by half of itself or so, and to twice or half of itself at most.
+  void step(bool move) {
+    const auto count = static_cast<Index>(free_.size()), runs = static_cast<Index>(decays_.size());
+    MatrixXd rows = MatrixXd::Zero(count * (runs + 1), count);
+    VectorXd right = VectorXd::Zero(rows.rows());
+    in_parallel(decays_.size(), [&](std::size_t d) {
+      const LawSmoother::Information known = smoothers_[d].information(joint_.theta(decays_[d]), sigma_[d]);
+      rows.middleRows(static_cast<Index>(d) * count, count) = known.factor;
+      right.segment(static_cast<Index>(d) * count, count) = known.right;
+    });
+    VectorXd change = VectorXd::Zero(count);
+    if (move) {
+      constexpr double share = 0.5, hardly = 1e-9;
+      const VectorXd now = values();
+      for (Index i = 0; i < count; ++i) rows(count * runs + i, i) = now[i] != 0 ? 1 / (share * std::abs(now[i])) : hardly * rows.col(i).norm() + 1e-300;
+      set(within_reach(now, now + rows.colPivHouseholderQr().solve(right)));
+      change = values() - now;
+    }
+    in_parallel(decays_.size(), [&](std::size_t d) { smoothers_[d].step(change); });
+  }
+
+  VectorXd within_reach(const VectorXd& now, VectorXd then) const {
+    for (Index i = 0; i < now.size(); ++i) {
+      const Parameter& p = joint_.parameter(joint_.unknowns()[free_[static_cast<std::size_t>(i)]]);
+      if (now[i] > 0) then[i] = std::clamp(then[i], now[i] / 2, 2 * now[i]);
+      then[i] = std::clamp(then[i], p.lower, p.upper);
+      if (!std::isfinite(then[i])) then[i] = now[i];
+    }
+    return then;
+  }
+
+  VectorXd values() const {
+    VectorXd v(static_cast<Index>(free_.size()));
+    for (std::size_t i = 0; i < free_.size(); ++i) v[static_cast<Index>(i)] = joint_.unknowns()[free_[i]].value;
+    return v;
+  }
+  void set(const VectorXd& values) {
+    for (std::size_t i = 0; i < free_.size(); ++i) joint_.unknowns()[free_[i]].value = values[static_cast<Index>(i)];
+  }
+  double cost() const {
+    double sum = 0;
+    for (std::size_t d = 0; d < decays_.size(); ++d) sum += smoothers_[d].cost(sigma_[d]);
+    return sum;
+  }
+
+  JointProblem joint_;
+  std::vector<std::size_t> free_, decays_;
+  std::vector<Index> parameters_;
+  std::vector<LawSmoother> smoothers_;
+  std::vector<VectorXd> sigma_, linear_;
+  double samples_ = 0, left_ = INFINITY;
+  int level_ = 0;
+};
+
 /// The decays of a joint problem as least squares in theta and c. Unknowns: those of the joint problem that are free, then c of each decay.
 class Decays {
  public:
-  explicit Decays(JointProblem& joint) : joint_(joint) {
+  /// `linear`: c of each decay, to start from.
+  Decays(JointProblem& joint, const std::vector<VectorXd>& linear) : joint_(joint) {
     for (std::size_t r = 0; r < joint.runs().size(); ++r)
       if (is_decay(joint.runs()[r])) decays_.push_back(r);
     for (std::size_t i = 0; i < joint.unknowns().size(); ++i) {
@@ -31,38 +176,21 @@ class Decays {
       const Parameter& p = joint.parameter(u);
       problem_.unknowns.push_back({joint.name(u), u.value, p.lower, p.upper, false, 0});
     }
-    for (const std::size_t r : decays_) add(r);
+    for (std::size_t d = 0; d < decays_.size(); ++d) add(decays_[d], linear[d]);
   }
 
-  Index longest() const {
-    Index most = 0;
-    for (const RunResidual& run : runs_) most = std::max(most, run.run().samples());
-    return most;
-  }
-  Index shortest() const {
-    Index least = 0;
-    for (const RunResidual& run : runs_) least = std::max(least, 2 * run.linear_unknowns());
-    return least;
-  }
-
-  /// Over records that grow from `from` to `to` samples; returns chi-square over the last.
-  double grow(Index from, Index to) {
+  void search() {
     LeastSquaresOptions options;
     options.effort = LeastSquaresOptions::Effort::once;
     options.precision = 0.5;
     options.relative_change = 1e-3;
-    options.iterations = 8;
-    constexpr double growth = 1.5;
-    for (auto samples = from; samples < to; samples = static_cast<Index>(growth * static_cast<double>(samples))) search(samples, options, true);
-    const bool whole = to >= longest();
-    if (whole) options.iterations = 30;
-    search(to, options, !whole);
-    return chi2();
+    options.iterations = 30;
+    const LeastSquaresResult result = solve_least_squares(problem_, options);
+    if (result.point.finite) take(result.point, problem_);
   }
 
   /// chi-square over the degrees of freedom of the whole records; theta and c go back to the joint problem.
   double settle() {
-    samples_ = longest();
     const double left = chi2();
     for (std::size_t i = 0; i < free_.size(); ++i) joint_.unknowns()[free_[i]].value = problem_.unknowns[i].value;
     double freedom = -static_cast<double>(free_.size());
@@ -81,20 +209,12 @@ class Decays {
     return point.finite ? point.chi2() : INFINITY;
   }
 
-  void search(Index samples, const LeastSquaresOptions& options, bool prior) {
-    samples_ = samples;
-    LeastSquaresProblem problem = problem_;
-    for (std::size_t i = 0; prior && i < free_.size(); ++i) problem.terms.push_back(weak_prior(i, problem.unknowns[i]));
-    const LeastSquaresResult result = solve_least_squares(problem, options);
-    if (result.point.finite) take(result.point, problem_);
-  }
-
-  void add(std::size_t r) {
+  void add(std::size_t r, const VectorXd& c) {
     const std::size_t d = runs_.size();
     runs_.push_back(joint_.runs()[r]);
     RunResidual& run = runs_.back();
     run.temper(1);
-    const VectorXd theta = joint_.theta(r), c = run.solve(theta).linear;
+    const VectorXd theta = joint_.theta(r);
     first_c_.push_back(problem_.unknowns.size());
     for (Index k = 0; k < c.size(); ++k) problem_.unknowns.push_back({run.run().file, std::isfinite(c[k]) ? c[k] : 0, -INFINITY, INFINITY, false, 0});
     ResidualTerm term;
@@ -112,7 +232,7 @@ class Decays {
     term.evaluate = [this, d, parameters, count, start = theta](const VectorXd& values, VectorXd& residual, MatrixXd* jacobian) {
       VectorXd at = start;
       at(parameters) = values.head(count);
-      const RunResidual::SideBySide s = runs_[d].side_by_side(at, values.tail(values.size() - count), samples_, jacobian == nullptr ? Partials::none : Partials::all);
+      const RunResidual::SideBySide s = runs_[d].side_by_side(at, values.tail(values.size() - count), jacobian == nullptr ? Partials::none : Partials::all);
       if (!std::isfinite(s.chi2)) return false;
       if (jacobian == nullptr) {
         residual[0] = std::sqrt(s.chi2);
@@ -131,7 +251,6 @@ class Decays {
   std::vector<RunResidual> runs_;
   std::vector<std::size_t> first_c_;
   LeastSquaresProblem problem_;
-  Index samples_ = 0;
 };
 
 }  // namespace
@@ -139,35 +258,30 @@ class Decays {
 bool has_decays(const JointProblem& joint) { return std::any_of(joint.runs().begin(), joint.runs().end(), is_decay); }
 
 double fit_decays(JointProblem& joint, const std::string& id) {
-  std::vector<JointProblem> starts;
+  JointProblem start = joint;
+  back_to_the_rig(start);
+  for (RunResidual& run : start.runs())
+    if (is_decay(run)) run.temper(1);
+  std::vector<std::unique_ptr<GrowingTrust>> fits;
   for (const double factor : {1.0, 0.2, 5.0}) {
-    starts.push_back(joint);
-    for (Unknown& u : starts.back().unknowns())
-      if (const Parameter& p = joint.parameter(u); p.name.starts_with(id + ".")) {
-        u.value = std::clamp(factor * u.value, p.lower, p.upper);
-        break;
-      }
+    JointProblem sized = start;
+    const std::vector<Unknown*> own = unknowns_of(sized, id);
+    if (!own.empty()) {
+      const Parameter& p = sized.parameter(*own.front());
+      own.front()->value = std::clamp(factor * own.front()->value, p.lower, p.upper);
+    }
+    const bool has_no_size = own.empty() || own.front()->value == 0;
+    fits.push_back(std::make_unique<GrowingTrust>(std::move(sized)));
+    if (has_no_size) break;
   }
-  std::vector<std::unique_ptr<Decays>> decays(starts.size());
-  std::vector<double> early(starts.size());
-  constexpr Index part = 8;
-  const auto early_samples = [](const Decays& d) { return std::max(d.shortest(), d.longest() / part); };
-  in_parallel(starts.size(), [&](std::size_t i) {
-    decays[i] = std::make_unique<Decays>(starts[i]);
-    early[i] = decays[i]->grow(decays[i]->shortest(), early_samples(*decays[i]));
-  });
-  std::vector<std::size_t> order{0, 1, 2};
-  std::sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) { return early[a] < early[b]; });
-  constexpr double followed = 1.5, hopeless = 20;
-  double least = INFINITY;
-  for (const std::size_t i : order) {
-    decays[i]->grow(early_samples(*decays[i]), decays[i]->longest());
-    const double left = decays[i]->settle();
-    if (left < least) joint = starts[i];
-    least = std::min(least, left);
-    if (least < followed || least > hopeless) break;
-  }
-  return least;
+  in_parallel(fits.size(), [&](std::size_t i) { fits[i]->fit(); });
+  const GrowingTrust* best = fits.front().get();
+  for (const auto& fit : fits)
+    if (fit->better_than(*best)) best = fit.get();
+  joint = best->joint();
+  Decays decays(joint, best->linear());
+  decays.search();
+  return decays.settle();
 }
 
 }  // namespace unrig

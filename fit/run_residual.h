@@ -67,14 +67,14 @@ class RunResidual {
   Solution solve(const Eigen::VectorXd& theta) const;
   Evaluation differentiate(const Solution& solution) const;
 
-  /// The first `samples` of the weighted residual measured - predicted at any theta and c, for searches that do not eliminate c; of runs whose motion is not
+  /// The weighted residual measured - predicted at any theta and c, for searches that do not eliminate c; of runs whose motion is not
   /// estimated. Residual and slopes are compressed to P + (unknowns) + 1 rows at most with the same inner products; empty for Partials::none.
   struct SideBySide {
     double chi2 = 0;
     Eigen::VectorXd residual;
     Eigen::MatrixXd in_theta, in_c;  ///< its slopes; rows x P, rows x unknowns
   };
-  SideBySide side_by_side(const Eigen::VectorXd& theta, const Eigen::VectorXd& linear, Eigen::Index samples, Partials partials) const;
+  SideBySide side_by_side(const Eigen::VectorXd& theta, const Eigen::VectorXd& linear, Partials partials) const;
 
   /// The fitted channels over the whole record, at theta and the c that belongs to it.
   struct Prediction {
@@ -169,6 +169,9 @@ class RunResidual {
   /// How near c of a nonlinear run is searched to its least chi-square, in standard errors. The slopes of chi-square in theta do not feel what is left: they are
   /// taken across the directions of c.
   void search_linear_to(double precision) { linear_precision_ = precision; }
+
+  /// States that the run may start with: behind the motion's unknowns in c, before the offsets.
+  const std::vector<Eigen::Index>& free_states() const { return free_; }
 
   Eigen::VectorXd channel_weight(std::size_t channel) const { return weight_.col(static_cast<Eigen::Index>(channel)); }
   const Eigen::VectorXd& angle_weight() const { return angle_weight_; }
