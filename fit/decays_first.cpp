@@ -49,17 +49,20 @@ class GrowingTrust {
     }
   }
 
-  /// Until the laws are trusted wholly, or leave more than the noise and more than they did.
-  void fit() {
-    constexpr int levels = 14, steps = 3;
-    constexpr double more_trust = 2.5, worse = 2;
-    begin();
-    for (level_ = 0; level_ < levels; ++level_) {
+  static constexpr int first_levels = 3, all_levels = 9;
+
+  /// Up to this level of trust, or until the laws leave more than the noise and more than they did.
+  void fit(int levels) {
+    constexpr int steps = 3;
+    constexpr double more_trust = 3, worse = 2;
+    if (sigma_.empty()) begin();
+    for (; level_ < levels && !gave_up_; ++level_) {
       const VectorXd before = values();
       for (int i = 0; i < steps; ++i) step(true);
       const double now = cost();
-      if (!(now < worse * std::max(left_, samples_ / 4)) && level_ > 0) {
+      if (!(now < worse * std::max(left_, samples_)) && level_ > 0) {
         set(before);
+        gave_up_ = true;
         return;
       }
       left_ = now;
@@ -80,15 +83,15 @@ class GrowingTrust {
   /// A first trajectory without laws, then sigma from what they are missed for; accelerations that no law explains count as less likely.
   void begin() {
     constexpr double ample = 4, beside = 0.1, least = 1e-6;
-    for (std::size_t d = 0; d < decays_.size(); ++d) sigma_.push_back(ample * smoothers_[d].enough_to_move(joint_.theta(decays_[d])));
-    share_sigma();
-    step(false);
     for (std::size_t d = 0; d < decays_.size(); ++d) {
-      sigma_[d] = (2 * smoothers_[d].disturbance()).cwiseMax(least * sigma_[d]);
+      sigma_.push_back(ample * smoothers_[d].enough_to_move(joint_.theta(decays_[d])));
       sigma_[d].tail(smoothers_[d].coordinates()) *= beside;
     }
     share_sigma();
-    constexpr int first_steps = 4;
+    step(false);
+    for (std::size_t d = 0; d < decays_.size(); ++d) sigma_[d] = (2 * smoothers_[d].disturbance()).cwiseMax(least * sigma_[d]);
+    share_sigma();
+    constexpr int first_steps = 8;
     for (int i = 0; i < first_steps; ++i) step(true);
   }
 
@@ -158,6 +161,7 @@ class GrowingTrust {
   std::vector<VectorXd> sigma_, linear_;
   double samples_ = 0, left_ = INFINITY;
   int level_ = 0;
+  bool gave_up_ = false;
 };
 
 /// The decays of a joint problem as least squares in theta and c. Unknowns: those of the joint problem that are free, then c of each decay.
@@ -179,19 +183,28 @@ class Decays {
     for (std::size_t d = 0; d < decays_.size(); ++d) add(decays_[d], linear[d]);
   }
 
-  void search() {
+  /// Over the whole records at once, or over records that grow from a few samples.
+  void search(bool growing) {
+    Index longest = 0, first = 0;
+    for (const RunResidual& run : runs_) {
+      longest = std::max(longest, run.run().samples());
+      first = std::max(first, 2 * run.linear_unknowns());
+    }
     LeastSquaresOptions options;
     options.effort = LeastSquaresOptions::Effort::once;
     options.precision = 0.5;
     options.relative_change = 1e-3;
+    options.iterations = 8;
+    constexpr double growth = 1.5;
+    for (samples_ = first; growing && samples_ < longest; samples_ = static_cast<Index>(growth * static_cast<double>(samples_))) search_with(options, true);
+    samples_ = longest;
     options.iterations = 30;
-    const LeastSquaresResult result = solve_least_squares(problem_, options);
-    if (result.point.finite) take(result.point, problem_);
+    search_with(options, false);
   }
 
   /// chi-square over the degrees of freedom of the whole records; theta and c go back to the joint problem.
   double settle() {
-    const double left = chi2();
+    const LeastSquaresPoint point = try_values(problem_, problem_.values());
     for (std::size_t i = 0; i < free_.size(); ++i) joint_.unknowns()[free_[i]].value = problem_.unknowns[i].value;
     double freedom = -static_cast<double>(free_.size());
     for (std::size_t d = 0; d < decays_.size(); ++d) {
@@ -200,13 +213,16 @@ class Decays {
       joint_.runs()[decays_[d]].start_from(c);
       freedom += static_cast<double>(runs_[d].degrees_of_freedom());
     }
-    return left / std::max(1.0, freedom);
+    return point.finite ? point.chi2() / std::max(1.0, freedom) : INFINITY;
   }
 
  private:
-  double chi2() const {
-    const LeastSquaresPoint point = try_values(problem_, problem_.values());
-    return point.finite ? point.chi2() : INFINITY;
+  /// `prior`: theta stays near where it is, while a few samples determine little of it.
+  void search_with(const LeastSquaresOptions& options, bool prior) {
+    LeastSquaresProblem problem = problem_;
+    for (std::size_t i = 0; prior && i < free_.size(); ++i) problem.terms.push_back(weak_prior(i, problem.unknowns[i]));
+    const LeastSquaresResult result = solve_least_squares(problem, options);
+    if (result.point.finite) take(result.point, problem_);
   }
 
   void add(std::size_t r, const VectorXd& c) {
@@ -232,7 +248,7 @@ class Decays {
     term.evaluate = [this, d, parameters, count, start = theta](const VectorXd& values, VectorXd& residual, MatrixXd* jacobian) {
       VectorXd at = start;
       at(parameters) = values.head(count);
-      const RunResidual::SideBySide s = runs_[d].side_by_side(at, values.tail(values.size() - count), jacobian == nullptr ? Partials::none : Partials::all);
+      const RunResidual::SideBySide s = runs_[d].side_by_side(at, values.tail(values.size() - count), samples_, jacobian == nullptr ? Partials::none : Partials::all);
       if (!std::isfinite(s.chi2)) return false;
       if (jacobian == nullptr) {
         residual[0] = std::sqrt(s.chi2);
@@ -251,7 +267,24 @@ class Decays {
   std::vector<RunResidual> runs_;
   std::vector<std::size_t> first_c_;
   LeastSquaresProblem problem_;
+  Index samples_ = 0;
 };
+
+/// From theta and c of `start`: over the whole records and, where that does not follow them, over records that grow. Leaves the better in `joint`.
+double fit_exactly(JointProblem& joint, const GrowingTrust& start) {
+  constexpr double followed = 2;
+  double least = INFINITY;
+  for (const bool growing : {false, true}) {
+    JointProblem tried = start.joint();
+    Decays decays(tried, start.linear());
+    decays.search(growing);
+    const double left = decays.settle();
+    if (left < least) joint = std::move(tried);
+    least = std::min(least, left);
+    if (least < followed) break;
+  }
+  return least;
+}
 
 }  // namespace
 
@@ -274,14 +307,12 @@ double fit_decays(JointProblem& joint, const std::string& id) {
     fits.push_back(std::make_unique<GrowingTrust>(std::move(sized)));
     if (has_no_size) break;
   }
-  in_parallel(fits.size(), [&](std::size_t i) { fits[i]->fit(); });
-  const GrowingTrust* best = fits.front().get();
+  in_parallel(fits.size(), [&](std::size_t i) { fits[i]->fit(GrowingTrust::first_levels); });
+  GrowingTrust* best = fits.front().get();
   for (const auto& fit : fits)
     if (fit->better_than(*best)) best = fit.get();
-  joint = best->joint();
-  Decays decays(joint, best->linear());
-  decays.search();
-  return decays.settle();
+  best->fit(GrowingTrust::all_levels);
+  return fit_exactly(joint, *best);
 }
 
 }  // namespace unrig

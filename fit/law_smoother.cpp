@@ -79,13 +79,15 @@ void LawSmoother::look_at_laws(const VectorXd& theta) {
     }
 }
 
-/// What a change of theta does to every step along the trajectory, at fixed laws: a column per step, parameter below parameter.
+/// What a change of theta does to every step along the trajectory, at fixed forces: a column per step, parameter below parameter.
 MatrixXd LawSmoother::moved_by_theta() const {
   const Index steps = samples_ - 1, given = system_.B.cols() - laws_;
   MatrixXd drive(states_ + 2 * laws_ + 2 * given, steps);
   drive.topRows(states_) = state_.leftCols(steps);
   drive.middleRows(states_, laws_) = force_.leftCols(steps);
   drive.middleRows(states_ + laws_, laws_) = force_.rightCols(steps);
+  if (followed_)
+    for (const Index first : {states_, states_ + laws_}) drive.middleRows(first, laws_) += disturbance_.topRows(laws_);
   if (given > 0) {
     drive.middleRows(states_ + 2 * laws_, given) = inputs_.topRows(steps).transpose();
     drive.bottomRows(given) = inputs_.middleRows(1, steps).transpose();

@@ -313,8 +313,8 @@ bool RunResidual::takes_small_steps(const VectorXd& theta) const {
   return std::any_of(system.feedback.begin(), system.feedback.end(), [](const Feedback& f) { return f.steps_per_sample > 1; });
 }
 
-RunResidual::SideBySide RunResidual::side_by_side(const VectorXd& theta, const VectorXd& linear, Partials partials) const {
-  const Index samples = last_sample_;
+RunResidual::SideBySide RunResidual::side_by_side(const VectorXd& theta, const VectorXd& linear, Index samples, Partials partials) const {
+  samples = std::min(samples, last_sample_);
   const bool slopes = partials == Partials::all;
   LinearSystem system = slopes ? differentiable_system(theta) : searched_system(theta);
   if (!slopes)

@@ -67,14 +67,14 @@ class RunResidual {
   Solution solve(const Eigen::VectorXd& theta) const;
   Evaluation differentiate(const Solution& solution) const;
 
-  /// The weighted residual measured - predicted at any theta and c, for searches that do not eliminate c; of runs whose motion is not
+  /// The first `samples` of the weighted residual measured - predicted at any theta and c, for searches that do not eliminate c; of runs whose motion is not
   /// estimated. Residual and slopes are compressed to P + (unknowns) + 1 rows at most with the same inner products; empty for Partials::none.
   struct SideBySide {
     double chi2 = 0;
     Eigen::VectorXd residual;
     Eigen::MatrixXd in_theta, in_c;  ///< its slopes; rows x P, rows x unknowns
   };
-  SideBySide side_by_side(const Eigen::VectorXd& theta, const Eigen::VectorXd& linear, Partials partials) const;
+  SideBySide side_by_side(const Eigen::VectorXd& theta, const Eigen::VectorXd& linear, Eigen::Index samples, Partials partials) const;
 
   /// The fitted channels over the whole record, at theta and the c that belongs to it.
   struct Prediction {
