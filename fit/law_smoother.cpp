@@ -44,8 +44,10 @@ void LawSmoother::prepare(const VectorXd& theta) {
   disturbances_ = laws_ + system_.coordinates;
   gamma0_ = exact_.input0.value.rightCols(laws_);
   gamma1_ = exact_.input1.value.rightCols(laws_);
-  disturb_.resize(states_, disturbances_);
-  disturb_ << gamma0_ + gamma1_, exact_.dt * MatrixXd::Identity(states_, states_).middleCols(system_.coordinates, system_.coordinates);
+  if (disturb_.size() == 0) {  // kept: a theta that makes a law stronger must not make its error cheaper
+    disturb_.resize(states_, disturbances_);
+    disturb_ << gamma0_ + gamma1_, exact_.dt * MatrixXd::Identity(states_, states_).middleCols(system_.coordinates, system_.coordinates);
+  }
   sees_.resize(laws_, states_);
   for (Index i = 0; i < laws_; ++i) sees_.row(i) = system_.feedback[static_cast<std::size_t>(i)].sees;
 }
@@ -86,8 +88,6 @@ MatrixXd LawSmoother::moved_by_theta() const {
   drive.topRows(states_) = state_.leftCols(steps);
   drive.middleRows(states_, laws_) = force_.leftCols(steps);
   drive.middleRows(states_ + laws_, laws_) = force_.rightCols(steps);
-  if (followed_)
-    for (const Index first : {states_, states_ + laws_}) drive.middleRows(first, laws_) += disturbance_.topRows(laws_);
   if (given > 0) {
     drive.middleRows(states_ + 2 * laws_, given) = inputs_.topRows(steps).transpose();
     drive.bottomRows(given) = inputs_.middleRows(1, steps).transpose();

@@ -19,7 +19,7 @@ using Strings = std::vector<std::string>;
 
 constexpr double explained = 1.15;     // residual power over noise power of a model that leaves nothing to name
 constexpr double nearly_all = 0.97;    // share of the excess that an effect must remove to be named where something remains
-constexpr double most_where_decays_decide = 0.9;  // the search leaves something of the other runs even when it has found what is missing
+constexpr double half = 0.5;           // of the excess, where decays decide: the search leaves something of the other runs even when it has found what is missing
 constexpr double nearly_explained = 10;
 constexpr double decisive = 10;        // BIC: very strong evidence (Kass and Raftery 1995)
 constexpr std::size_t most_refits = 5, most_effects = 3, most_in_full = 2;
@@ -253,8 +253,8 @@ Diagnosis diagnose(const DiagnoseProblem& problem) {
   const bool clean = leaves_nothing(best) || !d.remaining.found;
   const std::vector<ImprovedRun> unseen = problem.verdict_only ? std::vector<ImprovedRun>{} : predict_unseen(problem, fit_problem, baseline.arrival, best);
   const bool predicts = best.effects.empty() || power_over_noise(unseen, &ImprovedRun::rms_after) <= power_over_noise(unseen, &ImprovedRun::rms_before);
-  const double most_of_it = decays_decide(best) ? most_where_decays_decide : nearly_all;
-  const bool named = !best.effects.empty() && predicts && (clean || excess(best) < (1 - most_of_it) * excess(baseline));
+  const bool follows_decays = decays_decide(best) && best.decays_left < explained && excess(best) < half * excess(baseline);
+  const bool named = !best.effects.empty() && predicts && (clean || follows_decays || excess(best) < (1 - nearly_all) * excess(baseline));
   d.unexplained = d.mismatch.found && !(clean && predicts);
 
   if (!problem.verdict_only) {

@@ -73,14 +73,13 @@ void measure(Trial& trial) {
   trial.variables = 0;
   for (std::size_t r = 0; r < joint.runs().size(); ++r) {
     const auto [power, samples] = residual_power(joint, r);
-    trial.variance.push_back(power / samples);
+    const bool as_trusted = trial.decays_left > 0 && std::isfinite(trial.decays_left) && joint.runs()[r].motion().unknowns() == 0;
+    trial.variance.push_back(as_trusted ? std::max(1.0, trial.decays_left) : power / samples);
     trial.samples.push_back(samples * independent_share(joint.runs()[r], joint.theta(r)));
     trial.variables += static_cast<int>(joint.runs()[r].linear_unknowns());
   }
   for (const Unknown& u : joint.unknowns()) trial.variables += u.held ? 0 : 1;
 }
-
-bool takes_small_steps(const JointProblem& joint, std::size_t r) { return joint.runs()[r].takes_small_steps(joint.theta(r)); }
 
 /// Residual power over noise power of the runs whose motion is not estimated.
 double left_of_decays(const Trial& trial) {
@@ -141,12 +140,7 @@ void fit_fully(Trial& trial, int rounds) {
   measure(trial);
 }
 
-bool decays_decide(const Trial& trial) {
-  const JointProblem& joint = trial.arrival.joint;
-  bool small = false;
-  for (std::size_t r = 0; r < joint.runs().size(); ++r) small = small || takes_small_steps(joint, r);
-  return small && has_decays(joint);
-}
+bool decays_decide(const Trial& trial) { return takes_small_steps(trial.arrival.joint) && has_decays(trial.arrival.joint); }
 
 bool fit_decays_first(Trial& trial, const Trial& base) {
   JointProblem& joint = trial.arrival.joint;
@@ -157,9 +151,10 @@ bool fit_decays_first(Trial& trial, const Trial& base) {
   }
   const double left = fit_decays(joint, trial.effects.back());
   const bool helps = left < worth_it * left_of_decays(base);
+  if (takes_small_steps(joint)) trial.decays_left = left;
   if (helps)
     in_parallel(joint.runs().size(), [&](std::size_t r) {
-      if (takes_small_steps(joint, r)) joint.runs()[r].find_linear(joint.theta(r));
+      if (joint.runs()[r].takes_small_steps(joint.theta(r))) joint.runs()[r].find_linear(joint.theta(r));
     });
   temper(joint);
   measure(trial);
@@ -169,7 +164,7 @@ bool fit_decays_first(Trial& trial, const Trial& base) {
 void fit_exactly(Trial& trial) {
   JointProblem& joint = trial.arrival.joint;
   for (std::size_t r = 0; r < joint.runs().size(); ++r)
-    if (!takes_small_steps(joint, r)) joint.runs()[r].search_exactly(true);
+    if (!joint.runs()[r].takes_small_steps(joint.theta(r))) joint.runs()[r].search_exactly(true);
   anneal(trial.arrival, 3);
   measure(trial);
 }

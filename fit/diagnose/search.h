@@ -15,6 +15,7 @@ struct Trial {
   std::vector<double> variance = {};   ///< per run: residual power over noise power
   std::vector<double> samples = {};    ///< per run: as many of them as the residual's colour leaves independent
   int variables = 0;
+  double decays_left = 0;  ///< where decays decide: what fit_decays left of them; 0: not asked
 
   double reduced_chi2() const;    ///< over all runs, in units of the noise
 };

@@ -51,8 +51,8 @@ TEST(DecaysFirst, ResidualAndSlopesSideBySide) {
 }
 
 TEST(DecaysFirst, FreeplayIsFoundFromATorsionSpringThatIsFarOff) {
-  // The fit without the gap takes it for a soft, strongly damped torsion spring. The campaign is simulated in 32 steps a sample and with sharp
-  // corners, the fit takes eight and rounds them, which is why it does not come down to the noise.
+  // The fit without the gap takes it for a soft, strongly damped torsion spring. The campaign is simulated in 32 steps a sample; the smoother takes one, in which
+  // the section may cross the gap, and so puts the gap some percents off.
   std::seed_seq sequence{8u, 1u};
   std::mt19937_64 random(sequence);
   const TrialCampaign campaign = draw_campaign(read_rig(test::null_campaign("rig.toml")), {"freeplay"}, 0.03, random);
@@ -64,9 +64,9 @@ TEST(DecaysFirst, FreeplayIsFoundFromATorsionSpringThatIsFarOff) {
   Trial trial = prepare(problem, baseline, {"freeplay"});
   ASSERT_TRUE(has_decays(trial.arrival.joint));
   const double left = fit_decays(trial.arrival.joint, "freeplay");
-  EXPECT_LT(left - 1, 0.1 * (baseline.reduced_chi2() - 1)) << "what makes a name, where decays decide";
+  EXPECT_LT(left, 1.15) << "what counts as explained";
   ASSERT_EQ(unknowns_of(trial.arrival.joint, "freeplay").size(), 1u);
-  EXPECT_NEAR(unknowns_of(trial.arrival.joint, "freeplay").front()->value / campaign.parameters.front(), 1, 0.01);
+  EXPECT_NEAR(unknowns_of(trial.arrival.joint, "freeplay").front()->value / campaign.parameters.front(), 1, 0.05);
 }
 
 TEST(DecaysFirst, FrictionThatStopsTheRigIsFoundFromARigThatIsFarOff) {
