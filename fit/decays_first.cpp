@@ -274,7 +274,7 @@ class Decays {
 };
 
 /// From theta and c of `start`: over the whole records and, where that does not follow them, over records that grow. Leaves the better in `joint`.
-double fit_exactly(JointProblem& joint, const GrowingTrust& start) {
+double follow_exactly(JointProblem& joint, const GrowingTrust& start) {
   constexpr double followed = 2;
   double least = INFINITY;
   for (const bool growing : {false, true}) {
@@ -329,7 +329,7 @@ double fit_decays(JointProblem& joint, const std::string& id) {
     return best->left_as_trusted();
   }
   best->fit(GrowingTrust::all_levels);
-  return fit_exactly(joint, *best);
+  return follow_exactly(joint, *best);
 }
 
 }  // namespace unrig

@@ -40,7 +40,7 @@ class LawSmoother {
   /// Takes the trajectory that belongs to this change of theta.
   void step(const Eigen::VectorXd& change);
 
-  /// J along the present trajectory.
+  /// J along the present trajectory, with the laws' forces of the trajectory before it.
   double cost(const Eigen::VectorXd& sigma) const;
   /// R.m.s. of each disturbance along it.
   Eigen::VectorXd disturbance() const;

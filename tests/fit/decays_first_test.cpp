@@ -2,7 +2,10 @@
 
 #include <gtest/gtest.h>
 
+#include <memory>
 #include <random>
+#include <string>
+#include <vector>
 
 #include "core/in_parallel.h"
 #include "fit/diagnose/search.h"
@@ -50,39 +53,44 @@ TEST(DecaysFirst, ResidualAndSlopesSideBySide) {
   }
 }
 
+/// A simulated campaign with an effect hidden in it, and its fit without that effect.
+struct Hidden {
+  std::shared_ptr<const FitProblem> problem;  // the fit looks at its runs
+  std::vector<double> parameters;
+  Trial baseline;
+};
+
+Hidden hide(const std::string& effect, unsigned seed, unsigned trial) {
+  std::seed_seq sequence{seed, trial};
+  std::mt19937_64 random(sequence);
+  const TrialCampaign campaign = draw_campaign(read_rig(test::null_campaign("rig.toml")), {effect}, 0.03, random);
+  const auto problem = std::make_shared<FitProblem>();
+  problem->rig = campaign.rig;
+  problem->runs = campaign.runs;
+  return {problem, campaign.parameters, fit_baseline(*problem)};
+}
+
 TEST(DecaysFirst, FreeplayIsFoundFromATorsionSpringThatIsFarOff) {
   // The fit without the gap takes it for a soft, strongly damped torsion spring. The campaign is simulated in 32 steps a sample; the smoother takes one, in which
   // the section may cross the gap, and so puts the gap some percents off.
-  std::seed_seq sequence{8u, 1u};
-  std::mt19937_64 random(sequence);
-  const TrialCampaign campaign = draw_campaign(read_rig(test::null_campaign("rig.toml")), {"freeplay"}, 0.03, random);
-  FitProblem problem;
-  problem.rig = campaign.rig;
-  problem.runs = campaign.runs;
-  const Trial baseline = fit_baseline(problem);
-  ASSERT_GT(baseline.reduced_chi2(), 10);
-  Trial trial = prepare(problem, baseline, {"freeplay"});
+  const Hidden hidden = hide("freeplay", 8, 1);
+  ASSERT_GT(hidden.baseline.reduced_chi2(), 10);
+  Trial trial = prepare(*hidden.problem, hidden.baseline, {"freeplay"});
   ASSERT_TRUE(has_decays(trial.arrival.joint));
   const double left = fit_decays(trial.arrival.joint, "freeplay");
   EXPECT_LT(left, 1.15) << "what counts as explained";
   ASSERT_EQ(unknowns_of(trial.arrival.joint, "freeplay").size(), 1u);
-  EXPECT_NEAR(unknowns_of(trial.arrival.joint, "freeplay").front()->value / campaign.parameters.front(), 1, 0.05);
+  EXPECT_NEAR(unknowns_of(trial.arrival.joint, "freeplay").front()->value / hidden.parameters.front(), 1, 0.05);
 }
 
 TEST(DecaysFirst, FrictionThatStopsTheRigIsFoundFromARigThatIsFarOff) {
   // Without friction the fit reads its decay as strong damping. The campaign is simulated in quarter samples.
-  std::seed_seq sequence{6u, 0u};
-  std::mt19937_64 random(sequence);
-  const TrialCampaign campaign = draw_campaign(read_rig(test::null_campaign("rig.toml")), {"coulomb-friction"}, 0.03, random);
-  FitProblem problem;
-  problem.rig = campaign.rig;
-  problem.runs = campaign.runs;
-  const Trial baseline = fit_baseline(problem);
-  ASSERT_GT(baseline.reduced_chi2(), 50);
-  Trial trial = prepare(problem, baseline, {"coulomb-friction"});
+  const Hidden hidden = hide("coulomb-friction", 6, 0);
+  ASSERT_GT(hidden.baseline.reduced_chi2(), 50);
+  Trial trial = prepare(*hidden.problem, hidden.baseline, {"coulomb-friction"});
   EXPECT_LT(fit_decays(trial.arrival.joint, "coulomb-friction"), 1.15) << "what counts as explained";
   // 0.03 N of noise on some ten Newton over 2500 samples tell the force better than to a hundredth.
-  EXPECT_NEAR(unknowns_of(trial.arrival.joint, "coulomb-friction").front()->value / campaign.parameters.front(), 1, 0.01);
+  EXPECT_NEAR(unknowns_of(trial.arrival.joint, "coulomb-friction").front()->value / hidden.parameters.front(), 1, 0.01);
 }
 
 }  // namespace
