@@ -201,6 +201,7 @@ CorrectResult correct(const CorrectProblem& problem) {
   const AeroelasticModel model = free_model(problem, length);
 
   RunResidual residual(model, run, windows);
+  residual.search_exactly(true);  // the error of the load is that of the motion, and dry friction that lets go is far from any line
   const VectorXd start = theta_for(model, problem.fit, run.file);
   MatrixXd rough;
   const Search free = estimate(residual, prior_of(model, problem.fit, start, run.file), start, rough);
