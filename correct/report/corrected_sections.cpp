@@ -61,6 +61,28 @@ void add_corrected(ReportPage& page, const std::string& text, const std::string&
               "Amplitude of the whole record, mean removed, Hann window. What the rig adds stands in the reading only.");
 }
 
+void add_modal_load(ReportPage& page, const std::string& text, const std::string& path) {
+  const CsvTable table = read_csv(text, 1, path);
+  const CsvColumn& time = column(table, "time");
+  const VectorXd& t = increasing(table, time);
+  const CsvColumn &gauge = column(table, "gauge"), &load = column(table, "normal_force"), &load_std = column(table, "normal_force_std"), &inputs = column(table, "from_inputs");
+  const std::string name = file_name(path), time_label = labelled("time", time.unit);
+  const double dt = (t[t.size() - 1] - t[0]) / static_cast<double>(t.size() - 1);
+  const auto rms = [](const VectorXd& x) { return std::sqrt(x.array().isFinite().select(x.array().square(), 0).sum() / static_cast<double>(std::max<Index>(1, x.array().isFinite().count()))); };
+
+  page.add_verdict(Tone::good,
+                   fmt::format("A rigid rig that does not move would have read {} {} r.m.s., give or take {}; the gauge reads {}, of which the measured inputs account for {}.", plain(rms(load.value), 4),
+                               load.unit, plain(rms(load_std.value), 2), plain(rms(gauge.value), 4), plain(rms(inputs.value), 4)),
+                   name);
+  page.add_section("Correction: " + name);
+  page.add_plot({"Gauge and the load of a rigid rig", time_label, labelled("reading", load.unit), t, {{"gauge reading", 0, gauge.value}, {"rigid-rig load", 1, load.value, load_std.value}}, name,
+                 "The rig is known only as modes: the load is what the gauge would read of it if the rig were rigid and its mount at rest.", false, false, 320});
+  page.add_plot({"Gauge and what the measured inputs do to it", time_label, labelled("reading", gauge.unit), t,
+                 {{"gauge reading", 0, gauge.value}, {"from the measured inputs", 2, inputs.value}}, name, "Inputs are the motion of the mount and a measured force."});
+  add_spectra(page, "Spectra before and after the correction", dt, load.unit, {"gauge reading", 0, gauge.value}, {"rigid-rig load", 1, load.value, {}, true},
+              "Amplitude of the whole record, mean removed, Hann window. What the rig adds stands in the reading only.");
+}
+
 void add_indicial(ReportPage& page, const std::string& text, const std::string& path) {
   const CsvTable table = read_csv(text, 1, path);
   const VectorXd& s = increasing(table, column(table, "semichords"));

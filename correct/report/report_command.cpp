@@ -33,6 +33,7 @@ void add_result(ReportPage& page, const std::string& path, const ReportOptions& 
   const std::string text = read_text(path), header = text.substr(0, text.find('\n'));
   if (const std::size_t first = text.find_first_not_of(" \t\r\n"); first != std::string::npos && text[first] == '{') return add_json(page, text, path, options);
   if (header.starts_with("semichords,indicial")) return add_indicial(page, text, path);
+  if (header.find(",from_inputs") != std::string::npos) return add_modal_load(page, text, path);
   if (header.find("normal_force_std") != std::string::npos) return add_corrected(page, text, path);
   throw InputError({path, 1}, "neither JSON nor the header of a corrected record or an indicial response", wanted, "A recording itself is drawn with the fit.json that it belongs to.");
 }

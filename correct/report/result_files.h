@@ -38,6 +38,8 @@ void add_fit(ReportPage& page, const nlohmann::json& result, const std::string& 
 void add_apparent_mass(ReportPage& page, const nlohmann::json& result, const std::string& path, const ReportOptions& options);
 void add_diagnosis(ReportPage& page, const nlohmann::json& result, const std::string& path);
 void add_corrected(ReportPage& page, const std::string& text, const std::string& path);
+/// `unrig correct` on a rig that is known only as modes.
+void add_modal_load(ReportPage& page, const std::string& text, const std::string& path);
 void add_indicial(ReportPage& page, const std::string& text, const std::string& path);
 
 /// Amplitude spectra of two records on one grid, `dt` [s] apart, in the unit of the records: means removed, Hann window, missing samples bridged.

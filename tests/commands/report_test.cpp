@@ -4,7 +4,10 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <cstdint>
 #include <filesystem>
+
+#include <fmt/format.h>
 
 #include "core/text_file.h"
 #include "tests/commands/report_results.h"
@@ -78,6 +81,44 @@ TEST(Report, ShowsEveryResultOfTheChain) {
   ASSERT_TRUE(plot_titled(data, "Spectra of the free decays"));
   EXPECT_EQ((*plot_titled(data, "Spectra of the free decays"))["marks"].size(), 2u);
   ASSERT_TRUE(plot_titled(data, "Gauge and the load of a rigid rig"));
+}
+
+/// A mode of 5 Hz on a mount that is shaken, which reads 1000 N/m, under a load that steps from 0 to `load` [N] half-way.
+constexpr int shaken_samples = 800;
+std::string shaken(double load) {
+  constexpr double dt = 0.005, w = 2 * 3.14159265358979 * 5;
+  std::string run = "# unrig_run = 1\n# kind = \"moved\"\n# density = \"1.2 kg/m^3\"\n# speed = \"0 m/s\"\ntime [s],mount_acceleration [m/s^2],gauge [N]\n";
+  double x = 0, v = 0;
+  std::uint32_t random = 1;
+  for (int k = 0; k < shaken_samples; ++k) {
+    const double mount = std::sin(11 * k * dt);
+    random = 1664525 * random + 1013904223;
+    run += fmt::format("{:.3f},{:.6f},{:.6f}\n", k * dt, mount, 1000 * x + 0.01 * (static_cast<double>(random) / 4294967296.0 - 0.5));
+    constexpr int fine = 20;
+    for (int i = 0; i < fine; ++i) v += dt / fine * ((k < shaken_samples / 2 ? 0 : load) - mount - w * w * x - 2 * 0.02 * w * v), x += dt / fine * v;
+  }
+  return run;
+}
+
+TEST(Report, ShowsALoadOnARigThatIsKnownOnlyAsModes) {
+  const TemporaryDirectory directory;
+  const std::string rig = directory.file("rig.toml", "unrig_rig = 1\nname = \"spring\"\n[[modal]]\nmass = \"1 kg\"\nfrequency = \"5 Hz\"\ndamping_ratio = 0.02\ngauge_gain = \"1000 N/m\"\n");
+  const std::string fit = directory.path("fit.json"), corrected = directory.path("corrected.csv"), output = directory.path("report.html");
+  for (const std::vector<std::string>& command : std::vector<std::vector<std::string>>{{"fit", "--rig", rig, directory.file("empty.csv", shaken(0)), "-o", fit},
+                                                                                       {"correct", "--rig", rig, "--fit", fit, directory.file("loaded.csv", shaken(1)), "-o", corrected},
+                                                                                       {"report", corrected, "-o", output}}) {
+    const Finished finished = run_unrig(directory, command);
+    ASSERT_EQ(finished.status, 0) << finished.err;
+  }
+  const json data = page_data(output);
+  EXPECT_THAT(data["verdicts"][0]["text"].get<std::string>(), ::testing::AllOf(HasSubstr("rigid rig"), HasSubstr("measured inputs account for")));
+  const json* plot = plot_titled(data, "Gauge and the load of a rigid rig");
+  ASSERT_TRUE(plot);
+  EXPECT_EQ((*plot)["x"].size(), static_cast<std::size_t>(shaken_samples));
+  EXPECT_TRUE((*plot)["series"][1].contains("std"));
+  EXPECT_EQ((*plot)["y_label"], "reading [N]");
+  ASSERT_TRUE(plot_titled(data, "Gauge and what the measured inputs do to it"));
+  ASSERT_TRUE(plot_titled(data, "Spectra before and after the correction"));
 }
 
 TEST(Report, ShowsADiagnosis) {
