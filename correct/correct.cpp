@@ -58,13 +58,13 @@ AeroelasticModel free_model(const CorrectProblem& problem, double semichords) {
   return model;
 }
 
-/// The windows of the fit, and 40 knots more: a drive that still rings below the noise of the angle is load.
+/// The windows of the fit, and 40 samples more: a drive that still rings below the noise of the angle is load.
 std::vector<MotionBasis::Window> generous_windows(const Run& run) {
   constexpr Index more = 40;
   std::vector<MotionBasis::Window> windows = motion_windows(run);
   for (std::size_t w = 0; w < windows.size(); ++w) {
     const Index end = w + 1 < windows.size() ? windows[w + 1].knots.first - 4 * windows[w].stride - 1 : run.samples() - 5;
-    windows[w].knots.last = std::max(windows[w].knots.last, std::min(end, windows[w].knots.last + more * windows[w].stride));
+    windows[w].knots.last = std::max(windows[w].knots.last, std::min(end, windows[w].knots.last + more));
   }
   return windows;
 }
