@@ -1,7 +1,6 @@
 #include "fit/law_smoother.h"
 
 #include <Eigen/LU>
-#include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
 #include <utility>
@@ -16,9 +15,22 @@ using Eigen::MatrixXd;
 using Eigen::RowVectorXd;
 using Eigen::VectorXd;
 
-void triangularise(MatrixXd& rows) {
-  const Eigen::HouseholderQR<Eigen::Ref<MatrixXd>> in_place(rows);
-  for (Index j = 0; j < rows.cols(); ++j) rows.col(j).tail(std::max<Index>(0, rows.rows() - j - 1)).setZero();
+/// Reflects the rows such that the first `pivots` columns are upper triangular (Householder); the other columns follow.
+void triangularise(Eigen::Ref<MatrixXd> rows, Index pivots) {
+  for (Index j = 0; j < std::min(pivots, rows.rows() - 1); ++j) {
+    auto below = rows.col(j).tail(rows.rows() - j);
+    const double length = below.stableNorm();
+    if (!(length > 0)) continue;
+    const double end = below[0] > 0 ? -length : length;
+    below[0] -= end;  // the reflector, in the place of what it takes away
+    const double half = -end * below[0];
+    for (Index k = j + 1; k < rows.cols(); ++k) {
+      auto other = rows.col(k).tail(rows.rows() - j);
+      other -= below.dot(other) / half * below;
+    }
+    below.setZero();
+    below[0] = end;
+  }
 }
 
 }  // namespace
@@ -120,7 +132,10 @@ void LawSmoother::write_step(Index k, const Eigen::Ref<const MatrixXd>& moved) {
   step.middleCols(states_ + disturbances_, changes_) = moved + gamma0_ * law_partials(k) + gamma1_ * law_partials(k + 1);
   step.rightCols(1) = gamma0_ * (force_.col(k) - now.cwiseProduct(sees_ * state_.col(k))) + gamma1_ * (force_.col(k + 1) - then.cwiseProduct(sees_ * state_.col(k + 1)));
   if (given > 0) step.rightCols(1) += exact_.input0.value.leftCols(given) * inputs_.row(k).transpose() + exact_.input1.value.leftCols(given) * inputs_.row(k + 1).transpose();
-  if (followed_) step = (MatrixXd::Identity(states_, states_) - gamma1_ * then.asDiagonal() * sees_).partialPivLu().solve(step).eval();
+  if (followed_ && laws_ > 0) {  // (1 - gamma1 slope sees)^-1, of low rank
+    const MatrixXd pushed = gamma1_ * then.asDiagonal();
+    step += pushed * (MatrixXd::Identity(laws_, laws_) - sees_ * pushed).partialPivLu().solve(sees_ * step);
+  }
 }
 
 /// A reading near the trajectory, in units of its noise, over [x | change | offsets | right].
@@ -145,48 +160,58 @@ void LawSmoother::write_reading(Index k, Index channel, Eigen::Ref<RowVectorXd> 
 LawSmoother::Information LawSmoother::information(const VectorXd& theta, const VectorXd& sigma) {
   prepare(theta);
   look_at_laws(theta);
+  constexpr Index stack = 32;  // samples whose readings are put together before they are triangularised
   const Index steps = samples_ - 1, n = states_, u = disturbances_, all = n + changes_ + channels_;
   const MatrixXd moved = moved_by_theta();
   ahead_.resize(static_cast<std::size_t>(steps));
   best_disturbance_.resize(static_cast<std::size_t>(steps));
-  MatrixXd later = MatrixXd::Zero(all, all + 1);  // of all later samples, over [x | change | offsets | right]
-  MatrixXd rows(all + u + channels_, u + all + 1);
+  // What all later samples say: of the state behind the step over [x | change | offsets | right], and of [change | offsets | right] beside any state.
+  const Index beside = changes_ + channels_ + 1;
+  MatrixXd later = MatrixXd::Zero(n, n + beside), known = MatrixXd::Zero(beside + channels_ * stack, beside);
+  MatrixXd rows(n + u + channels_, u + n + beside);
+  RowVectorXd row(all + 1);
+  Index filled = beside;
   for (Index k = steps; k >= 0; --k) {
     rows.setZero();
     if (k < steps) {
       write_step(k, Eigen::Map<const MatrixXd>(moved.col(k).data(), n, changes_));
       const MatrixXd& step = ahead_[static_cast<std::size_t>(k)];
-      const auto of_state = later.leftCols(n);
-      rows.topLeftCorner(all, u).noalias() = of_state * step.middleCols(n, u);
-      rows.block(0, u, all, n).noalias() = of_state * step.leftCols(n);
-      rows.block(0, u + n, all, changes_) = later.middleCols(n, changes_);
-      rows.block(0, u + n, all, changes_).noalias() += of_state * step.middleCols(n + u, changes_);
-      rows.block(0, u + n + changes_, all, channels_) = later.middleCols(n + changes_, channels_);
-      rows.topRightCorner(all, 1) = later.rightCols(1);
-      rows.topRightCorner(all, 1).noalias() -= of_state * step.rightCols(1);
-      rows.block(all, 0, u, u).diagonal() = sigma.cwiseInverse();
+      const auto of_state = later.leftCols(n).triangularView<Eigen::Upper>();
+      rows.topLeftCorner(n, u) = of_state * step.middleCols(n, u);
+      rows.block(0, u, n, n) = of_state * step.leftCols(n);
+      rows.topRightCorner(n, beside) = later.rightCols(beside);
+      rows.block(0, u + n, n, changes_) += of_state * step.middleCols(n + u, changes_);
+      rows.topRightCorner(n, 1) -= of_state * step.rightCols(1);
+      rows.block(n, 0, u, u).diagonal() = sigma.cwiseInverse();
     }
     for (Index c = 0; c < channels_; ++c)
       if (weight_(k, c) > 0) {
-        RowVectorXd row = RowVectorXd::Zero(all + 1);
+        row.setZero();
         write_reading(k, c, row);
-        rows.row(all + u + c).tail(all + 1) = row;
+        rows.row(n + u + c).tail(all + 1) = row;
       }
-    triangularise(rows);
+    triangularise(rows, u + n);
     if (k < steps) best_disturbance_[static_cast<std::size_t>(k)] = rows.topRows(u);
-    later = rows.block(u, u, all, all + 1);
+    later = rows.block(u, u, n, all + 1);
+    known.middleRows(filled, channels_) = rows.bottomRightCorner(channels_, beside);
+    filled += channels_;
+    if (filled == known.rows() || k == 0) {
+      triangularise(known.topRows(filled), beside);
+      filled = beside;
+    }
   }
 
   // Of the first state only some is free; what the readings do not determine of it stays zero.
   constexpr double hardly = 1e-9;
   const auto free = static_cast<Index>(free_.size());
-  first_ = MatrixXd::Zero(all + free, free + channels_ + changes_ + 1);
+  first_ = MatrixXd::Zero(n + beside + free, free + beside);
   for (Index i = 0; i < free; ++i) {
-    first_.col(i).head(all) = later.col(free_[static_cast<std::size_t>(i)]);
-    first_(all + i, i) = hardly * first_.col(i).norm() + 1e-300;
+    first_.col(i).head(n) = later.col(free_[static_cast<std::size_t>(i)]);
+    first_(n + beside + i, i) = hardly * first_.col(i).norm() + 1e-300;
   }
-  first_.topRows(all).rightCols(channels_ + changes_ + 1) << later.middleCols(n + changes_, channels_), later.middleCols(n, changes_), later.rightCols(1);
-  triangularise(first_);
+  first_.block(0, free, n, beside) << later.middleCols(n + changes_, channels_), later.middleCols(n, changes_), later.rightCols(1);
+  first_.block(n, free, beside, beside) << known.block(0, changes_, beside, channels_), known.topLeftCorner(beside, changes_), known.topRightCorner(beside, 1);
+  triangularise(first_, first_.cols());
   const Index solved = free + channels_;
   return {first_.block(solved, solved, changes_, changes_), first_.block(solved, solved + changes_, changes_, 1)};
 }
