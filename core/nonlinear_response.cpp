@@ -177,7 +177,6 @@ class Follower {
       now_.col(0) = now_.col(count);
       slope_.col(0) = slope_.col(count);
     }
-    response_.equivalent_slope = (square_.array() > 0).select(product_.array() / square_.array().max(1e-300), 0.0);
     response_.largest_argument = largest_;
     response_.end = now_.col(0).head(one_.states);
     response_.end_tangent = tangent_.topRows(one_.states);
@@ -207,7 +206,7 @@ class Follower {
     slope_.col(0) = laws_.slope;
     law_partial_ = MatrixXd::Zero(m, one_.parameters * (block + 1));
     if (one_.parameters > 0) laws_.partials_at(z_, law_partials(0));
-    product_ = square_ = largest_ = VectorXd::Zero(m);
+    largest_ = VectorXd::Zero(m);
     tangent_ = next_ = MatrixXd::Zero(std::max(one_.rows(), one_.input()), columns_);
     if (directions_ > 0) tangent_.topLeftCorner(n, directions_) = drive_.start_tangent;
     if (one_.parameters > 0 && drive_.start_partial.size() > 0) tangent_.topRightCorner(n, one_.parameters) = drive_.start_partial;
@@ -237,7 +236,7 @@ class Follower {
         const double force = laws_.force[i], z = z_[i];
         next.head(n) += force * one_.late.col(i).head(n);
         next[one_.force() + i] = force;
-        product_[i] += force * z, square_[i] += z * z, largest_[i] = std::max(largest_[i], std::abs(z));
+        largest_[i] = std::max(largest_[i], std::abs(z));
       }
       slope_.col(k + 1) = laws_.slope;
       if (one_.parameters > 0) laws_.partials_at(z_, law_partials(k + 1));
@@ -298,7 +297,7 @@ class Follower {
   FewSquare<M> gain_;  // how the force at the end of a step moves what the laws see there
   NonlinearResponse response_;
   MatrixXd now_, slope_, law_partial_, source_, tangent_, next_;
-  VectorXd stepped_, product_, square_, largest_;
+  VectorXd stepped_, largest_;
   Few<M> z_;
 };
 

@@ -23,7 +23,6 @@ struct NonlinearResponse {
   std::vector<Eigen::MatrixXd> tangent;  ///< per channel: samples x (K + P), P = 0 for Partials::none
   Eigen::VectorXd end;                   ///< n
   Eigen::MatrixXd end_tangent;           ///< n x (K + P)
-  Eigen::VectorXd equivalent_slope;      ///< per feedback <f z>/<z^2>: the linear law nearest to it along this response
   Eigen::VectorXd largest_argument;      ///< per feedback: largest |z|
   bool finite = true;
 };

@@ -10,6 +10,7 @@
 #include <fmt/format.h>
 
 #include "core/effects/effect.h"
+#include "core/in_parallel.h"
 #include "fit/first_guess.h"
 #include "fit/undetermined.h"
 
@@ -215,35 +216,32 @@ void choose_effect_starts(Arrival& arrival, const FitProblem& problem, const std
   set_starts(arrival.joint, problem.start);
 }
 
-/// Widens a window of the motion where the gauge still sees the shaft move beyond it: chi-square must fall by clearly more than the knots added.
-bool widen_motion(JointProblem& joint, const std::vector<Run>& runs, Windows& windows) {
+/// Widens a window of a run's motion where the gauge still sees the shaft move beyond it: chi-square must fall by clearly more than the knots added.
+bool widen_motion(RunResidual& run, const VectorXd& theta, std::vector<MotionBasis::Window>& windows) {
   bool widened = false;
-  for (std::size_t r = 0; r < runs.size(); ++r) {
-    double before = -1;  // chi-square with the present windows, once it is known
-    for (std::size_t w = 0; w < windows[r].size(); ++w) {
-      const Interval knots = windows[r][w].knots;
-      const Index more = std::max<Index>(10, knots.length() / 4);
-      for (const bool later : {true, false}) {
-        std::vector<MotionBasis::Window> trial = windows[r];
-        Interval& k = trial[w].knots;
-        if (later)
-          k.last = std::min(w + 1 < trial.size() ? trial[w + 1].knots.first - 5 : runs[r].samples() - 5, k.last + more);
-        else
-          k.first = std::max<Index>(w > 0 ? trial[w - 1].knots.last + 5 : 0, k.first - more);
-        const auto added = static_cast<double>(k.length() - windows[r][w].knots.length());
-        if (added <= 0) continue;
-        RunResidual wider = joint.runs()[r].with_motion(trial);
-        const VectorXd theta = joint.theta(r);
-        wider.reject_spikes(theta);
-        if (!(before >= 0)) before = joint.runs()[r].solve(theta).chi2;
-        const double scale = std::max(1.0, before / static_cast<double>(joint.runs()[r].degrees_of_freedom()));
-        const double gain = (before - wider.solve(theta).chi2) / scale;
-        if (gain < added + 4 * std::sqrt(2 * added)) continue;  // four standard deviations of chi-square with that many degrees
-        windows[r] = trial;
-        joint.runs()[r] = std::move(wider);
-        before = -1;
-        widened = true;
-      }
+  double before = -1;  // chi-square with the present windows, once it is known
+  for (std::size_t w = 0; w < windows.size(); ++w) {
+    const Interval knots = windows[w].knots;
+    const Index more = std::max<Index>(10, knots.length() / 4);
+    for (const bool later : {true, false}) {
+      std::vector<MotionBasis::Window> trial = windows;
+      Interval& k = trial[w].knots;
+      if (later)
+        k.last = std::min(w + 1 < trial.size() ? trial[w + 1].knots.first - 5 : run.run().samples() - 5, k.last + more);
+      else
+        k.first = std::max<Index>(w > 0 ? trial[w - 1].knots.last + 5 : 0, k.first - more);
+      const auto added = static_cast<double>(k.length() - windows[w].knots.length());
+      if (added <= 0) continue;
+      RunResidual wider = run.with_motion(trial);
+      wider.reject_spikes(theta);
+      if (!(before >= 0)) before = run.solve(theta).chi2;
+      const double scale = std::max(1.0, before / static_cast<double>(run.degrees_of_freedom()));
+      const double gain = (before - wider.solve(theta).chi2) / scale;
+      if (gain < added + 4 * std::sqrt(2 * added)) continue;  // four standard deviations of chi-square with that many degrees
+      windows = trial;
+      run = std::move(wider);
+      before = -1;
+      widened = true;
     }
   }
   return widened;
@@ -290,8 +288,10 @@ Arrival extend(const FitProblem& problem, const Arrival& without, const std::sha
     arrival.joint.runs()[r].keep_noise_of(without.joint.runs()[r]);
     arrival.joint.runs()[r].start_from(without.joint.runs()[r]);
   }
+  for (RunResidual& run : arrival.joint.runs()) run.glance(true);
   choose_effect_starts(arrival, problem, added);
   hold_undetermined(arrival.joint);
+  for (RunResidual& run : arrival.joint.runs()) run.glance(false);
   return arrival;
 }
 
@@ -319,15 +319,16 @@ Arrival go_on_with_effects(const FitProblem& problem, const Arrival& without, co
 
 void refine(Arrival& arrival, const FitProblem& problem) {
   JointProblem& joint = arrival.joint;
-  for (std::size_t r = 0; r < joint.runs().size(); ++r) {
-    joint.runs()[r].settle_noise(joint.theta(r));
-    joint.runs()[r].search_exactly(!joint.runs()[r].takes_small_steps(joint.theta(r)));
-  }
+  for (std::size_t r = 0; r < joint.runs().size(); ++r) joint.runs()[r].settle_noise(joint.theta(r));
   constexpr int rounds = 4;
   for (int round = 0; round < rounds; ++round) {
-    Index rejected = 0;
-    for (std::size_t r = 0; r < joint.runs().size(); ++r) rejected += joint.runs()[r].reject_spikes(joint.theta(r));
-    const bool changed = widen_motion(joint, problem.runs, arrival.windows) || rejected > 0;
+    std::vector<char> run_changed(joint.runs().size(), 0);
+    in_parallel(run_changed.size(), [&](std::size_t r) {
+      const VectorXd theta = joint.theta(r);
+      const bool rejected = joint.runs()[r].reject_spikes(theta) > 0;
+      run_changed[r] = widen_motion(joint.runs()[r], theta, arrival.windows[r]) || rejected;
+    });
+    const bool changed = std::find(run_changed.begin(), run_changed.end(), 1) != run_changed.end();
     if (!changed && round > 0) break;
     tell(problem, "refining the motion");
     solve(arrival);  // the first time for the noise levels' sake

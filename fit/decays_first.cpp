@@ -18,14 +18,17 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
+constexpr double followed = 1.2;  // chi-square over the degrees of freedom of decays that a model can be said to follow
+
 bool is_decay(const RunResidual& run) { return run.motion().unknowns() == 0; }
 
-/// A fit that cannot follow leaves parameters far from the truth: those more than a factor two from the rig file's go back there.
+/// A fit that cannot follow leaves parameters far from the truth: those more than a factor two from their first values go back there.
 void back_to_the_rig(JointProblem& joint) {
   const VectorXd rig = joint.model().start_values();
   for (Unknown& u : joint.unknowns()) {
     const double there = rig[u.parameter];
-    if (u.run < 0 && !u.held && there > 0 && std::abs(std::log(u.value / there)) > std::log(2.0) && !belongs_to_an_effect(joint.parameter(u).name)) u.value = there;
+    const bool near = u.value > there / 2 && u.value < 2 * there;
+    if (!u.held && there > 0 && !near && !belongs_to_an_effect(joint.parameter(u).name)) u.value = there;
   }
 }
 
@@ -275,7 +278,6 @@ class Decays {
 
 /// From theta and c of `start`: over the whole records and, where that does not follow them, over records that grow. Leaves the better in `joint`.
 double follow_exactly(JointProblem& joint, const GrowingTrust& start) {
-  constexpr double followed = 2;
   double least = INFINITY;
   for (const bool growing : {false, true}) {
     JointProblem tried = start.joint();
@@ -304,23 +306,28 @@ double fit_decays(JointProblem& joint, const std::string& id) {
   back_to_the_rig(start);
   for (RunResidual& run : start.runs())
     if (is_decay(run)) run.temper(1);
-  std::vector<std::unique_ptr<GrowingTrust>> fits;
-  for (const double factor : {1.0, 0.2, 5.0}) {
+  const std::vector<Unknown*> own = unknowns_of(start, id);
+  const double size = own.empty() ? 0 : own.front()->value;
+  const auto trust = [&](double factor, int levels) {
     JointProblem sized = start;
-    const std::vector<Unknown*> own = unknowns_of(sized, id);
-    if (!own.empty()) {
-      const Parameter& p = sized.parameter(*own.front());
-      own.front()->value = std::clamp(factor * own.front()->value, p.lower, p.upper);
+    if (size != 0) {
+      Unknown& u = *unknowns_of(sized, id).front();
+      u.value = std::clamp(factor * size, sized.parameter(u).lower, sized.parameter(u).upper);
     }
-    const bool has_no_size = own.empty() || own.front()->value == 0;
-    fits.push_back(std::make_unique<GrowingTrust>(std::move(sized)));
-    if (has_no_size) break;
-  }
-  in_parallel(fits.size(), [&](std::size_t i) { fits[i]->fit(GrowingTrust::first_levels); });
-  GrowingTrust* best = fits.front().get();
-  for (const auto& fit : fits)
-    if (fit->better_than(*best)) best = fit.get();
+    auto fit = std::make_unique<GrowingTrust>(std::move(sized));
+    fit->fit(levels);
+    return fit;
+  };
+  const auto better_of_other_sizes = [&](int levels) {
+    std::vector<std::unique_ptr<GrowingTrust>> fits(2);
+    in_parallel(fits.size(), [&](std::size_t i) { fits[i] = trust(i == 0 ? 0.2 : 5.0, levels); });
+    return std::move(fits[0]->better_than(*fits[1]) ? fits[0] : fits[1]);
+  };
+
   if (takes_small_steps(joint)) {
+    std::unique_ptr<GrowingTrust> best = trust(1, GrowingTrust::first_levels);
+    if (size != 0)
+      if (auto other = better_of_other_sizes(GrowingTrust::first_levels); other->better_than(*best)) best = std::move(other);
     best->fit(GrowingTrust::trusted_levels);
     joint = best->joint();
     std::size_t d = 0;
@@ -328,8 +335,16 @@ double fit_decays(JointProblem& joint, const std::string& id) {
       if (is_decay(run)) run.start_from(best->linear()[d++]);
     return best->left_as_trusted();
   }
-  best->fit(GrowingTrust::all_levels);
-  return follow_exactly(joint, *best);
+
+  const std::unique_ptr<GrowingTrust> first = trust(1, GrowingTrust::all_levels);
+  JointProblem found = joint;
+  const double left = follow_exactly(found, *first);
+  if (left > followed && size != 0) {
+    const std::unique_ptr<GrowingTrust> other = better_of_other_sizes(GrowingTrust::all_levels);
+    if (const double others_left = other->better_than(*first) ? follow_exactly(joint, *other) : INFINITY; others_left < left) return others_left;
+  }
+  joint = std::move(found);
+  return left;
 }
 
 }  // namespace unrig

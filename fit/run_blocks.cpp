@@ -81,10 +81,4 @@ MatrixXd Block::reached(Rotated& rotated) const {
   return top;
 }
 
-MatrixXd Block::reached_of(const MatrixXd& all) const {
-  Rotated rotated;
-  rotate(samples, all, rotated);
-  return reached(rotated);
-}
-
 }  // namespace unrig::run_rows

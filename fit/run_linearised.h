@@ -129,7 +129,6 @@ class Block {
   void rotate(const Interval& some, Eigen::MatrixXd all, Rotated& rotated) const;
   /// What c reaches of all rows taken; what is left joins the others.
   Eigen::MatrixXd reached(Rotated& rotated) const;
-  Eigen::MatrixXd reached_of(const Eigen::MatrixXd& all) const;
 
  private:
   std::vector<Rotation> rotations_;  // per stretch, or of the whole motion; none where the rows are few already
@@ -163,7 +162,6 @@ struct RunResidual::Linearised {
   bool polynomials = false;               // whether what is left of a rest may be looked at as polynomials
 
   std::vector<run_rows::Block> blocks;  // phase by phase, channel by channel
-  std::shared_ptr<const Linearised> tangents;  // of a nonlinear run with prescribed motion: its equivalent linear system, which c is searched along
 
   /// Solves the stacked rows [c | y] for c, beside a sum of squares that c cannot reach.
   void settle(const std::vector<Eigen::MatrixXd>& rows, Eigen::Index unknowns, double unreachable) {

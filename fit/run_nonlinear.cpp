@@ -15,10 +15,6 @@ using Eigen::VectorXd;
 
 namespace {
 
-// Steps of a search for c. From where the equivalent linear system led, exact tangents arrive in a few, or the law has kinks and the next search in theta comes
-// by again.
-constexpr int most_far_away = 30, most_nearby = 8;
-
 /// Jerk and inputs of one phase.
 void drive_over(const Interval& s, bool moving, const VectorXd& jerk, const MatrixXd& inputs, NonlinearDrive& drive) {
   drive.jerk = moving ? VectorXd(jerk.segment(s.first, s.length())) : VectorXd();
@@ -55,14 +51,13 @@ MatrixXd RunResidual::jerk_slope(const Interval& samples) const {
 struct RunResidual::NonlinearPoint {
   VectorXd linear;
   MatrixXd left;  // measured - predicted, samples x channels
-  VectorXd equivalent_slope;
   double chi2 = INFINITY;
 };
 
 RunResidual::NonlinearPoint RunResidual::nonlinear_point(const Linearised& lin, const VectorXd& theta, const VectorXd& linear) const {
   NonlinearDrive from{initial_state(linear, lin.system.states()), whole_jerk(linear), inputs_, MatrixXd(lin.system.states(), 0), {}};
   const NonlinearResponse response = follow(lin.system, lin.step, theta, from, last_sample_, Partials::none);
-  NonlinearPoint point{linear, {}, response.equivalent_slope};
+  NonlinearPoint point{linear, {}};
   if (!response.finite) return point;
   point.left = measured_.topRows(last_sample_) - response.output;
   point.left.rowwise() -= linear.segment(first_offset_, measured_.cols()).transpose();
@@ -126,24 +121,17 @@ bool RunResidual::stack_nonlinear_rows(Linearised& lin, const VectorXd& theta, c
   return true;
 }
 
-/// The system with every feedback replaced by a linear law of this slope, and the rows of c in it.
-std::shared_ptr<RunResidual::Linearised> RunResidual::equivalent_linear(const Linearised& lin, const VectorXd& slope) const {
-  auto plain = std::make_shared<Linearised>();
-  plain->system = lin.system;
-  LinearSystem& system = plain->system;
-  const Index measured = system.B.cols() - slope.size();
-  for (Index i = 0; i < slope.size(); ++i) {
-    const Eigen::RowVectorXd sees = slope[i] * lin.system.feedback[static_cast<std::size_t>(i)].sees;
-    system.A.value += lin.system.B.value.col(measured + i) * sees;
-    system.C.value += lin.system.D.value.col(measured + i) * sees;
-  }
-  system.feedback.clear();
-  for (DualMatrix* m : {&system.B, &system.D}) *m = m->block(0, 0, m->rows(), measured);
-  plain->step = exact_step(system, run_->dt);
-  prepare_linear(*plain);
-  plain->polynomials = false;  // what the nonlinear model leaves of the readings is looked at sample by sample
-  stack_rows(*plain);
-  return plain;
+/// c of the linear part alone.
+VectorXd RunResidual::without_laws(const Linearised& lin) const {
+  Linearised plain;
+  plain.system = lin.system;
+  const Index measured = plain.system.B.cols() - static_cast<Index>(plain.system.feedback.size());
+  plain.system.feedback.clear();
+  for (DualMatrix* m : {&plain.system.B, &plain.system.D}) *m = m->block(0, 0, m->rows(), measured);
+  plain.step = exact_step(plain.system, run_->dt);
+  prepare_linear(plain);
+  stack_rows(plain);
+  return plain.linear;
 }
 
 /// Standard errors widen with what is left.
@@ -165,7 +153,8 @@ RunResidual::NonlinearPoint RunResidual::first_nonlinear_point(const Linearised&
     if (std::isfinite(best.chi2) && best.chi2 < 2 * guide_.chi2) return best;
   }
   if (last_linear_.size() > 0) consider(last_linear_);
-  if (!std::isfinite(best.chi2)) consider(equivalent_linear(lin, VectorXd::Zero(static_cast<Index>(lin.system.feedback.size())))->linear);
+  if (!std::isfinite(best.chi2)) consider(without_laws(lin));
+  if (glance_) return best;
   constexpr double followed = 2;
   if ((motion_.unknowns() == 0 || from_afar_) && best.chi2 * tempered_ * tempered_ > followed * static_cast<double>(degrees_of_freedom()))
     if (NonlinearPoint grown = along_growing_record(lin, theta, best); grown.chi2 < best.chi2) return grown;
@@ -189,7 +178,7 @@ RunResidual::NonlinearPoint RunResidual::along_growing_record(const Linearised& 
   const Index moves = motion_.unknowns() > 0 ? motion_.active().front().first : 0;
   if (motion_.unknowns() > 0) point.linear = as_the_angle_says();
   for (part.last_sample_ = std::min(last_sample_, moves + 2 * unknowns_); part.last_sample_ < last_sample_;) {
-    part.search_along_tangents(part_lin, theta, part.nonlinear_point(lin, theta, point.linear), most_far_away);
+    part.search_along_tangents(part_lin, theta, part.nonlinear_point(lin, theta, point.linear));
     if (!std::isfinite(part_lin.chi2)) return point;
     point.linear = part_lin.linear;
     part.last_sample_ = std::min(last_sample_, static_cast<Index>(growth * static_cast<double>(part.last_sample_)) + 1);
@@ -201,15 +190,14 @@ void RunResidual::solve_nonlinear(Linearised& lin, const VectorXd& theta) const 
   NonlinearPoint point = first_nonlinear_point(lin, theta);
   lin.chi2 = INFINITY;
   if (!std::isfinite(point.chi2)) return;
-  if (motion_.unknowns() > 0)
-    search_along_equivalent(lin, theta, std::move(point));
-  else
-    search_along_tangents(lin, theta, std::move(point), most_far_away);
+  search_along_tangents(lin, theta, std::move(point));
   if (std::isfinite(lin.chi2)) last_linear_ = lin.linear;
 }
 
 /// Levenberg-Marquardt steps in c: a full Gauss-Newton step where chi-square falls by it, else the more damped the longer it does not.
-void RunResidual::search_along_tangents(Linearised& lin, const VectorXd& theta, NonlinearPoint point, int most) const {
+void RunResidual::search_along_tangents(Linearised& lin, const VectorXd& theta, NonlinearPoint point) const {
+  constexpr int a_glance = 2, full_search = 30;
+  const int most = glance_ ? a_glance : full_search;
   constexpr double least_damping = 1e-4, most_damping = 1e4, growth = 10;
   double damping = 0;
   for (int i = 0; i < most; ++i) {
@@ -237,46 +225,6 @@ void RunResidual::search_along_tangents(Linearised& lin, const VectorXd& theta, 
   }
 }
 
-/// Steps in c along the rows of the equivalent linear system, which is made anew where they stop helping.
-void RunResidual::search_along_equivalent(Linearised& lin, const VectorXd& theta, NonlinearPoint point) const {
-  constexpr int systems = 4, most = 12;
-  for (int made = 0; made < systems; ++made) {
-    const std::shared_ptr<Linearised> plain = equivalent_linear(lin, point.equivalent_slope);
-    lin.tangents = plain;
-    bool arrived = false;
-    for (int i = 0; i < most && !arrived; ++i) {
-      std::vector<MatrixXd> rows;
-      for (const run_rows::Block& block : plain->blocks) {
-        const Interval& s = block.samples;
-        rows.push_back(block.reached_of(weight_.col(block.channel).segment(s.first, s.length()).cwiseProduct(point.left.col(block.channel).segment(s.first, s.length()))));
-      }
-      for (const MatrixXd& angle : angle_rows_) rows.emplace_back(angle.col(unknowns_) - angle.leftCols(unknowns_) * point.linear);
-      const MatrixXd rotated = plain->eliminate->rotated(run_rows::stacked(rows, 1));
-      const double promised = rotated.topRows(plain->eliminate->rank()).squaredNorm();
-      if (!worth_going_on(promised, point.chi2)) {
-        arrived = true;
-        break;
-      }
-      const VectorXd step = plain->eliminate->solve(rotated);
-      NonlinearPoint next = nonlinear_point(lin, theta, point.linear + step);
-      if (!(next.chi2 < point.chi2)) next = nonlinear_point(lin, theta, point.linear + 0.3 * step);
-      if (!(next.chi2 < point.chi2)) {
-        arrived = made > 0;
-        break;
-      }
-      const bool slow = point.chi2 - next.chi2 < 0.3 * promised;
-      point = std::move(next);
-      if (slow && i > 3) break;
-    }
-    if (arrived) break;
-  }
-  lin.linear = point.linear;
-  lin.chi2 = point.chi2;
-  if (!exact_tangents_) return;
-  lin.tangents.reset();
-  search_along_tangents(lin, theta, std::move(point), from_afar_ ? most_far_away : most_nearby);
-}
-
 void RunResidual::follow_nonlinear_partials(const LinearSystem& system, const VectorXd& theta, const VectorXd& linear, const TakeRows& take) const {
   const ExactStep step = step_to_follow(system, run_->dt);
   const auto parameters = static_cast<Index>(model_->parameters().size());
@@ -300,11 +248,9 @@ void RunResidual::follow_nonlinear_partials(const LinearSystem& system, const Ve
 }
 
 void RunResidual::find_linear(const VectorXd& theta) {
-  const bool exact = std::exchange(exact_tangents_, true);
   from_afar_ = true;
   solve(theta);
   from_afar_ = false;
-  exact_tangents_ = exact;
   guide_ = {};
 }
 

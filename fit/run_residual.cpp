@@ -1,5 +1,6 @@
 #include "fit/run_residual.h"
 
+#include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -198,6 +199,12 @@ void RunResidual::keep_noise_of(const RunResidual& other) {
 RunResidual RunResidual::with_motion(std::vector<MotionBasis::Window> windows) const {
   RunResidual other(*model_, *run_, std::move(windows));
   other.keep_noise_of(*this);
+  if (last_linear_.size() == unknowns_ && unknowns_ > 0 && other.motion_.unknowns() > 0) {  // a search for c starts from the same motion
+    const Interval whole{0, run_->samples()};
+    VectorXd start(other.unknowns_);
+    start << other.motion_.angle_columns(whole).householderQr().solve(motion_.angle_columns(whole) * last_linear_.head(motion_.unknowns())), last_linear_.tail(unknowns_ - motion_.unknowns());
+    if (start.allFinite()) other.last_linear_ = start;
+  }
   return other;
 }
 

@@ -32,10 +32,8 @@ struct RunOptions {
 /// ((y_measured - y(theta, c)) / sigma)^2 is least over c for every theta (variable projection, Golub and Pereyra 1973), so that a nonlinear solver
 /// sees only theta.
 ///
-/// With nonlinear effects at work the linear unknowns enter nonlinearly too, and c is searched for at every theta: in runs without prescribed motion by
-/// Levenberg-Marquardt steps along exact tangents (core/nonlinear_response.h); in runs with it along those of the equivalent linear system (force and state by
-/// least squares along the response), because exact ones would cost n x n x (knots) a sample. The prediction itself and its partials in theta are exact in
-/// both; where c stops is then off by the difference of the tangents times what the residual happens to hold of them, a small part of c's own error.
+/// With nonlinear effects at work the linear unknowns enter nonlinearly too, and c is searched for at every theta by Levenberg-Marquardt steps along exact
+/// tangents (core/nonlinear_response.h): n x n x (knots) a sample and step.
 ///
 /// Rests without jerk are compressed exactly: their rows span only the free response of the model, an n-dimensional space. Once its vibrations have died out
 /// (below 1e-11), a stretch of 1024 samples is looked at as the few numbers that a polynomial needs (fit/rest_rows.h), so that a long rest costs next to nothing.
@@ -156,12 +154,11 @@ class RunResidual {
   }
   double tempered() const { return tempered_; }
 
-  /// Lets c of a nonlinear run with prescribed motion be searched along exact tangents too, from where the equivalent linear system led: an order slower, and needed
-  /// where the rig moves so little that the law is far from any line (friction that sticks).
-  void search_exactly(bool exact) { exact_tangents_ = exact; }
+  /// A glance at a nonlinear run: c in two steps, and the model in one step a sample whatever its laws ask for. Enough to compare starts and candidates.
+  void glance(bool only) { glance_ = only; }
 
-  /// Moves c of a nonlinear run with prescribed motion to the least chi-square that exact tangents reach over a record that grows, at theta: from there on
-  /// searches along the equivalent linear system stay near it. For laws with corners that the rig crosses all the time (freeplay).
+  /// Moves c of a nonlinear run with prescribed motion to the least chi-square that exact tangents reach over a record that grows, at theta. For laws with corners that
+  /// the rig crosses all the time (freeplay).
   void find_linear(const Eigen::VectorXd& theta);
   /// Whether following the model takes several steps a sample, which makes exact tangents dear.
   bool takes_small_steps(const Eigen::VectorXd& theta) const;
@@ -188,10 +185,9 @@ class RunResidual {
   NonlinearPoint first_nonlinear_point(const Linearised& lin, const Eigen::VectorXd& theta) const;
   bool worth_going_on(double promised, double chi2) const;
   NonlinearPoint nonlinear_point(const Linearised& lin, const Eigen::VectorXd& theta, const Eigen::VectorXd& linear) const;
-  std::shared_ptr<Linearised> equivalent_linear(const Linearised& lin, const Eigen::VectorXd& slope) const;
+  Eigen::VectorXd without_laws(const Linearised& lin) const;
   void solve_nonlinear(Linearised& lin, const Eigen::VectorXd& theta) const;
-  void search_along_tangents(Linearised& lin, const Eigen::VectorXd& theta, NonlinearPoint point, int most) const;
-  void search_along_equivalent(Linearised& lin, const Eigen::VectorXd& theta, NonlinearPoint point) const;
+  void search_along_tangents(Linearised& lin, const Eigen::VectorXd& theta, NonlinearPoint point) const;
   void add_prediction_slope(const Linearised& lin, const run_rows::Block& block, const Eigen::MatrixXd& linear_slope, Eigen::MatrixXd& slope) const;
   void prepare_linear(Linearised& lin) const;
   using TakeRows = std::function<void(std::size_t block, const Interval& samples, Eigen::MatrixXd rows)>;
@@ -224,7 +220,7 @@ class RunResidual {
   Eigen::MatrixXd weight_;    ///< 1 / sigma, 0 where left out
   std::vector<double> sigma_;
   double tempered_ = 1;
-  bool exact_tangents_ = false, from_afar_ = false;
+  bool from_afar_ = false;
   Eigen::VectorXd angle_, angle_weight_;
   double angle_sigma_ = 0;
   Eigen::MatrixXd motion_prior_;  ///< [c | 0]
@@ -244,6 +240,7 @@ class RunResidual {
   };
   mutable Guide guide_;
   double linear_precision_ = 3e-3;
+  bool glance_ = false;
 
   // Layout of c.
   std::vector<Eigen::Index> free_;  ///< states whose initial value is unknown

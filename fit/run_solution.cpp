@@ -246,8 +246,10 @@ RunResidual::Solution RunResidual::solve(const VectorXd& theta) const {
 /// The model's system, corners of its laws rounded where they have any.
 LinearSystem RunResidual::searched_system(const VectorXd& theta) const {
   LinearSystem system = model_->system(conditions_, theta, channels_);
-  for (Feedback& f : system.feedback)
+  for (Feedback& f : system.feedback) {
     if (f.rounded) f.law = f.rounded;
+    if (glance_) f.steps_per_sample = 1;
+  }
   return system;
 }
 
@@ -317,7 +319,7 @@ void RunResidual::follow_partials(const VectorXd& theta, const VectorXd& linear,
 }
 
 RunResidual::Evaluation RunResidual::differentiate(const Solution& solution) const {
-  const Linearised& lin = solution.model->tangents ? *solution.model->tangents : *solution.model;
+  const Linearised& lin = *solution.model;
   const auto parameters = static_cast<Index>(model_->parameters().size());
   std::vector<run_rows::Rotated> rotated_blocks(lin.blocks.size());
   double beside = 0;
@@ -382,7 +384,7 @@ RunResidual::Prediction RunResidual::predict(const VectorXd& theta) const {
   Prediction p;
   p.channels = channels_;
   p.linear = solution.linear;
-  p.linear_factor = (lin.tangents ? *lin.tangents : lin).eliminate->factor();
+  p.linear_factor = lin.eliminate->factor();
   p.offset = p.linear.segment(first_offset_, measured_.cols());
   p.initial_state = p.linear.segment(first_state_, static_cast<Index>(free_.size()));
   if (angle_offset_ >= 0) p.angle_offset = p.linear.segment(angle_offset_, 1);
@@ -436,7 +438,7 @@ void RunResidual::add_prediction_slope(const Linearised& lin, const run_rows::Bl
 
 RunResidual::Sensitivity RunResidual::sensitivity(const VectorXd& theta) const {
   const Solution solution = solve(theta);
-  const Linearised& lin = solution.model->tangents ? *solution.model->tangents : *solution.model;
+  const Linearised& lin = *solution.model;
   const Evaluation e = differentiate(solution);
   const auto parameters = static_cast<Index>(model_->parameters().size());
   const Index n = run_->samples();
@@ -468,7 +470,7 @@ MatrixXd RunResidual::linear_rows(const VectorXd& theta) const {
   free.set_motion_prior({});
   const Solution solution = free.solve(theta);
   MatrixXd rows(unknowns_, unknowns_ + 1);
-  const Linearised& lin = solution.model->tangents ? *solution.model->tangents : *solution.model;
+  const Linearised& lin = *solution.model;
   const MatrixXd factor = lin.eliminate->factor();
   rows << factor, factor * solution.linear;
   return rows;

@@ -47,11 +47,6 @@ bool nonlinear(const Trial& trial) {
 
 bool leaves_nothing(const Trial& trial) { return trial.reduced_chi2() < explained; }
 
-/// Near the truth, and not there: what is left may be the equivalent linear system's.
-bool worth_exact_tangents(const Trial& trial) {
-  return trial.reduced_chi2() < nearly_explained && !leaves_nothing(trial) && nonlinear(trial) && !decays_decide(trial);
-}
-
 /// Some trials, the best first once they are fitted.
 using Trials = std::vector<Trial>;
 
@@ -69,7 +64,6 @@ void fit_nonlinear(Trials& trials, const Trial& base) {
     Trial& trial = trials[i];
     if (fit_decays_first(trial, base) && !decays_decide(trial)) {
       fit_fully(trial, 2);
-      if (worth_exact_tangents(trial)) fit_exactly(trial);
       if (trial.reduced_chi2() < least) fit_fully(trial, 6);
     }
     least = std::min(least, trial.reduced_chi2());
@@ -104,7 +98,8 @@ Trials try_one_more(const DiagnoseProblem& problem, const FitProblem& fit_proble
   for (const auto& trial : prepared) {
     const bool promises_nothing = effect(trial->effects.back()).parameters.empty();  // it may hold all the same
     const bool promises = linear.size() + others.size() < most_refits && trial->score > 0.25 * best_score;
-    if (prepared.size() <= few || promises_nothing || promises) (nonlinear(*trial) ? others : linear).push_back(std::move(*trial));
+    const bool step_says_nothing = nonlinear(*trial) && base.reduced_chi2() > nearly_explained;  // a law far from the truth
+    if (prepared.size() <= few || promises_nothing || promises || step_says_nothing) (nonlinear(*trial) ? others : linear).push_back(std::move(*trial));
     else if (unpromising.size() < most_in_full && !nonlinear(*trial)) unpromising.push_back(std::move(*trial));
   }
   // Linear effects first, which are an order faster; nonlinear ones where none of those leaves nothing or they promise as much.
@@ -138,7 +133,6 @@ Trial without_superfluous(const FitProblem& fit_problem, Trial trial) {
     fewer.erase(fewer.begin() + static_cast<std::ptrdiff_t>(k));
     Trial smaller = prepare(fit_problem, trial, fewer);
     fit_fully(smaller, 6);
-    if (worth_exact_tangents(smaller)) fit_exactly(smaller);  // as the larger set has been
     if (bic_difference(smaller, trial) < decisive)
       trial = std::move(smaller);
     else
@@ -244,7 +238,6 @@ Diagnosis diagnose(const DiagnoseProblem& problem) {
     for (const Trial& t : tried) d.ranking.push_back({t.effects, t.reduced_chi2(), bic_difference(t, baseline), 0, best.effects.empty() ? t.score : 0});
     if (tried.empty() || bic_difference(tried.front(), best) > -decisive) break;
     best = without_superfluous(fit_problem, tried.front());
-    if (worth_exact_tangents(best)) fit_exactly(best);
   }
   give_probabilities(d.ranking);
   std::sort(d.ranking.begin(), d.ranking.end(), [](const Candidate& a, const Candidate& b) { return a.delta_bic < b.delta_bic; });

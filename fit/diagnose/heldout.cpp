@@ -22,10 +22,12 @@ HeldoutResidual predict_heldout(const Arrival& arrival, const FitProblem& proble
   JointProblem::SolveOptions options;
   options.iterations = 12;
   options.tolerance = 1e-4;
-  joint.solve(options);
+  options.precision = 0.1;  // what is predicted moves by less than its own noise
+  options.most_evaluations = 15;
   RunResidual& residual = joint.runs().front();
+  residual.find_linear(joint.theta(0));
+  joint.solve(options);
   residual.reject_spikes(joint.theta(0));
-  residual.search_exactly(true);
   joint.solve(options);
   const RunResidual::Prediction p = residual.predict(joint.theta(0));
   const VectorXd weight = residual.channel_weight(0), left = run.channel(p.channels.front()).value - p.output.col(0);

@@ -83,16 +83,12 @@ VectorXd standardised_residual(const RunResidual& run, const RunResidual::Predic
   return left;
 }
 
-std::array<double, 2> residual_power(const JointProblem& joint, std::size_t r) {
+std::vector<VectorXd> standardised_residuals(const JointProblem& joint, std::size_t r) {
   const RunResidual& run = joint.runs()[r];
   const RunResidual::Prediction p = run.predict(joint.theta(r));
-  double sum = 0, count = 0;
-  for (std::size_t c = 0; c < p.channels.size(); ++c) {
-    const VectorXd left = standardised_residual(run, p, c);
-    sum += left.squaredNorm();
-    count += static_cast<double>((left.array() != 0).count());
-  }
-  return {sum, count};
+  std::vector<VectorXd> all;
+  for (std::size_t c = 0; c < p.channels.size(); ++c) all.push_back(standardised_residual(run, p, c));
+  return all;
 }
 
 Mismatch locate_mismatch(const JointProblem& joint) {

@@ -34,7 +34,7 @@ Mismatch locate_mismatch(const JointProblem& joint);
 /// The residual of fitted channel `channel` of a run in units of its noise, untempered; 0 where left out.
 Eigen::VectorXd standardised_residual(const RunResidual& run, const RunResidual::Prediction& prediction, std::size_t channel);
 
-/// Power of the fitted channels' residuals in units of the noise, of run `run`, without any tempering: sum of squares and count of samples.
-std::array<double, 2> residual_power(const JointProblem& joint, std::size_t run);
+/// Of all fitted channels of run `run`, where the fit stands.
+std::vector<Eigen::VectorXd> standardised_residuals(const JointProblem& joint, std::size_t run);
 
 }  // namespace unrig

@@ -19,14 +19,32 @@ using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
 /// Share of a residual's samples that its colour leaves independent: the flatness of its spectrum, 1 for white noise.
-double independent_share(const RunResidual& run, const VectorXd& theta) {
-  const RunResidual::Prediction p = run.predict(theta);
-  VectorXd left = run.run().channel(p.channels.front()).value - p.output.col(0);
-  for (Index k = 0; k < left.size(); ++k)
-    if (!(run.channel_weight(0)[k] > 0) || !std::isfinite(left[k])) left[k] = 0;
+double independent_share(const VectorXd& left) {
   const VectorXd power = fourier(left).cwiseAbs2();
   const double mean = power.mean();
   return mean > 0 ? std::min(1.0, 2 * mean * mean / power.cwiseAbs2().mean()) : 1;  // the lines of white noise are exponentially distributed
+}
+
+/// What the present fit leaves of a run.
+struct LeftOfRun {
+  double variance = 0;     // residual power over noise power
+  double samples = 0;
+  double independent = 0;  // of them, as the residual's colour says
+};
+
+std::vector<LeftOfRun> left_of_runs(const JointProblem& joint) {
+  std::vector<LeftOfRun> all(joint.runs().size());
+  in_parallel(all.size(), [&](std::size_t r) {
+    const std::vector<VectorXd> left = standardised_residuals(joint, r);
+    double power = 0;
+    for (const VectorXd& channel : left) {
+      power += channel.squaredNorm();
+      all[r].samples += static_cast<double>((channel.array() != 0).count());
+    }
+    all[r].variance = power / all[r].samples;
+    all[r].independent = all[r].samples * independent_share(left.front());
+  });
+  return all;
 }
 
 /// How far chi-square would fall by one Gauss-Newton step in all unknowns.
@@ -45,9 +63,9 @@ double promised_share(const JointProblem& joint, double before) {
 /// Weights of the runs such that each is left with about the power of its noise; true where that changed any by more than a tenth.
 bool temper(JointProblem& joint) {
   bool changed = false;
-  for (std::size_t r = 0; r < joint.runs().size(); ++r) {
-    const auto [power, samples] = residual_power(joint, r);
-    const double factor = std::sqrt(std::max(1.0, power / samples)), now = factor < 1.1 ? 1.0 : factor;
+  const std::vector<LeftOfRun> left = left_of_runs(joint);
+  for (std::size_t r = 0; r < left.size(); ++r) {
+    const double factor = std::sqrt(std::max(1.0, left[r].variance)), now = factor < 1.1 ? 1.0 : factor;
     changed = changed || std::abs(std::log(now / joint.runs()[r].tempered())) > 0.1;
     joint.runs()[r].temper(now);
   }
@@ -71,11 +89,11 @@ void measure(Trial& trial) {
   trial.variance.clear();
   trial.samples.clear();
   trial.variables = 0;
-  for (std::size_t r = 0; r < joint.runs().size(); ++r) {
-    const auto [power, samples] = residual_power(joint, r);
+  const std::vector<LeftOfRun> left = left_of_runs(joint);
+  for (std::size_t r = 0; r < left.size(); ++r) {
     const bool as_trusted = trial.decays_left > 0 && std::isfinite(trial.decays_left) && joint.runs()[r].motion().unknowns() == 0;
-    trial.variance.push_back(as_trusted ? std::max(1.0, trial.decays_left) : power / samples);
-    trial.samples.push_back(samples * independent_share(joint.runs()[r], joint.theta(r)));
+    trial.variance.push_back(as_trusted ? std::max(1.0, trial.decays_left) : left[r].variance);
+    trial.samples.push_back(left[r].independent);
     trial.variables += static_cast<int>(joint.runs()[r].linear_unknowns());
   }
   for (const Unknown& u : joint.unknowns()) trial.variables += u.held ? 0 : 1;
@@ -131,7 +149,9 @@ Trial prepare(const FitProblem& problem, const Trial& base, const std::vector<st
     if (std::find(base.effects.begin(), base.effects.end(), id) == base.effects.end()) added.push_back(id);
   const auto model = std::make_shared<const AeroelasticModel>(model_of(problem.rig, problem.runs, problem.circulation, effects));
   Trial trial{effects, extend(problem, base.arrival, model, added)};
+  for (RunResidual& run : trial.arrival.joint.runs()) run.glance(true);
   trial.score = promised_share(trial.arrival.joint, base.arrival.joint.chi2());
+  for (RunResidual& run : trial.arrival.joint.runs()) run.glance(false);
   return trial;
 }
 
@@ -152,21 +172,16 @@ bool fit_decays_first(Trial& trial, const Trial& base) {
   const double left = fit_decays(joint, trial.effects.back());
   const bool helps = left < worth_it * left_of_decays(base);
   if (takes_small_steps(joint)) trial.decays_left = left;
+  measure(trial);
   if (helps)
-    in_parallel(joint.runs().size(), [&](std::size_t r) {
-      if (joint.runs()[r].takes_small_steps(joint.theta(r))) joint.runs()[r].find_linear(joint.theta(r));
+    in_parallel(joint.runs().size(), [&](std::size_t r) {  // c of the others still is the baseline's
+      constexpr double astray = 10;
+      RunResidual& run = joint.runs()[r];
+      if (run.takes_small_steps(joint.theta(r)) || trial.variance[r] > astray) run.find_linear(joint.theta(r));
     });
   temper(joint);
   measure(trial);
   return helps;
-}
-
-void fit_exactly(Trial& trial) {
-  JointProblem& joint = trial.arrival.joint;
-  for (std::size_t r = 0; r < joint.runs().size(); ++r)
-    if (!joint.runs()[r].takes_small_steps(joint.theta(r))) joint.runs()[r].search_exactly(true);
-  anneal(trial.arrival, 3);
-  measure(trial);
 }
 
 void fit_from_first_guesses(const FitProblem& problem, Trial& trial) {

@@ -41,10 +41,6 @@ bool fit_decays_first(Trial& trial, const Trial& base);
 /// Fits a prepared trial with everything free, while the weights of the runs return to those of their noise, in so many rounds.
 void fit_fully(Trial& trial, int rounds);
 
-/// The same once more with exact tangents for the motion (RunResidual::search_exactly), where they are not too dear: for nonlinear effects that nearly explain the
-/// runs.
-void fit_exactly(Trial& trial);
-
 /// The same all over again from first guesses, with windows that grow from a few periods: for effects without which the rig's parameters go far astray. Keeps the better.
 void fit_from_first_guesses(const FitProblem& problem, Trial& trial);
 
