@@ -20,7 +20,8 @@ using Strings = std::vector<std::string>;
 constexpr double explained = 1.15;     // residual power over noise power of a model that leaves nothing to name
 constexpr double nearly_all = 0.97;    // share of the excess that an effect must remove to be named where something remains
 constexpr double half = 0.5;           // of the excess, where decays decide: the search leaves something of the other runs even when it has found what is missing
-constexpr double nearly_explained = 10;
+constexpr double nearly_explained = 10, twice_the_noise = 2;
+constexpr double hardly_less = 0.9;    // of the excess: an effect that leaves so much of it is not what is missing
 constexpr double decisive = 10;        // BIC: very strong evidence (Kass and Raftery 1995)
 constexpr std::size_t most_refits = 5, most_effects = 3, most_in_full = 2;
 constexpr std::size_t few = 7;  // candidates that are all worth a fit
@@ -98,7 +99,7 @@ Trials try_one_more(const DiagnoseProblem& problem, const FitProblem& fit_proble
   for (const auto& trial : prepared) {
     const bool promises_nothing = effect(trial->effects.back()).parameters.empty();  // it may hold all the same
     const bool promises = linear.size() + others.size() < most_refits && trial->score > 0.25 * best_score;
-    const bool step_says_nothing = nonlinear(*trial) && base.reduced_chi2() > nearly_explained;  // a law far from the truth
+    const bool step_says_nothing = nonlinear(*trial) && base.reduced_chi2() > twice_the_noise;  // a law far from the truth
     if (prepared.size() <= few || promises_nothing || promises || step_says_nothing) (nonlinear(*trial) ? others : linear).push_back(std::move(*trial));
     else if (unpromising.size() < most_in_full && !nonlinear(*trial)) unpromising.push_back(std::move(*trial));
   }
@@ -237,6 +238,7 @@ Diagnosis diagnose(const DiagnoseProblem& problem) {
     const Trials tried = try_one_more(problem, fit_problem, best);
     for (const Trial& t : tried) d.ranking.push_back({t.effects, t.reduced_chi2(), bic_difference(t, baseline), 0, best.effects.empty() ? t.score : 0});
     if (tried.empty() || bic_difference(tried.front(), best) > -decisive) break;
+    if (!leaves_nothing(tried.front()) && excess(tried.front()) > hardly_less * excess(best)) break;
     best = without_superfluous(fit_problem, tried.front());
   }
   give_probabilities(d.ranking);
