@@ -56,13 +56,19 @@ class GrowingTrust {
 
   /// Up to this level of trust, or until the laws leave more than the noise and more than they did.
   void fit(int levels) {
-    constexpr int steps = 3;
-    constexpr double more_trust = 3, worse = 2;
+    constexpr int steps = 3, most_steps = 9;
+    constexpr double more_trust = 3, worse = 2, enough = 1.1, falls = 0.98;
     if (sigma_.empty()) begin();
     for (; level_ < levels && !gave_up_; ++level_) {
       const VectorXd before = values();
       for (int i = 0; i < steps; ++i) step(true);
-      const double now = cost();
+      double now = cost();
+      for (int i = 0; i < most_steps && now > enough * samples_; ++i) {  // on while that helps
+        step(true);
+        const double next = cost();
+        if (!(next < falls * now)) break;
+        now = next;
+      }
       if (!(now < worse * std::max(left_, samples_)) && level_ > 0) {
         set(before);
         gave_up_ = true;

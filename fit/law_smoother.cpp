@@ -37,20 +37,35 @@ void triangularise(Eigen::Ref<MatrixXd> rows, Index pivots) {
 
 LawSmoother::LawSmoother(const RunResidual& run, std::vector<Index> parameters) : run_(run), parameters_(std::move(parameters)), inputs_(run_inputs(run.run(), run.conditions())), free_(run.free_states()) {
   const std::vector<std::string> names = run.model().output_channels(run.run());
-  samples_ = std::min(run.run().samples(), most_samples);
+  const LinearSystem first = run.model().system(run.conditions(), run.model().start_values(), names);
+  for (const Feedback& f : first.feedback) parts_ = std::max(parts_, std::min(most_parts, f.steps_per_sample));
+  readings_ = std::min(run.run().samples(), most_samples);
+  samples_ = (readings_ - 1) * parts_ + 1;
   channels_ = static_cast<Index>(names.size());
   changes_ = static_cast<Index>(parameters_.size());
-  measured_.resize(samples_, channels_);
-  weight_.resize(samples_, channels_);
+  measured_ = weight_ = MatrixXd::Zero(samples_, channels_);
   for (Index c = 0; c < channels_; ++c) {
-    weight_.col(c) = run.channel_weight(static_cast<std::size_t>(c)).head(samples_);
-    measured_.col(c) = (weight_.col(c).array() > 0).select(run.run().channel(names[static_cast<std::size_t>(c)]).value.head(samples_), 0);
+    const VectorXd& value = run.run().channel(names[static_cast<std::size_t>(c)]).value;
+    const VectorXd weight = run.channel_weight(static_cast<std::size_t>(c));
+    for (Index k = 0; k < readings_; ++k)
+      if (weight[k] > 0) {
+        weight_(k * parts_, c) = weight[k];
+        measured_(k * parts_, c) = value[k];
+      }
+  }
+  if (parts_ > 1 && inputs_.cols() > 0) {  // straight between samples
+    const MatrixXd at_samples = inputs_;
+    inputs_.resize(samples_, at_samples.cols());
+    for (Index k = 0; k < samples_; ++k) {
+      const double part = static_cast<double>(k % parts_) / static_cast<double>(parts_);
+      inputs_.row(k) = (1 - part) * at_samples.row(k / parts_) + part * at_samples.row(std::min(k / parts_ + 1, at_samples.rows() - 1));
+    }
   }
 }
 
 void LawSmoother::prepare(const VectorXd& theta) {
   system_ = run_.model().system(run_.conditions(), theta, run_.model().output_channels(run_.run()));
-  exact_ = exact_step(system_, run_.run().dt);
+  exact_ = exact_step(system_, run_.run().dt / static_cast<double>(parts_));
   states_ = system_.states();
   laws_ = static_cast<Index>(system_.feedback.size());
   disturbances_ = laws_ + system_.coordinates;
@@ -69,8 +84,8 @@ VectorXd LawSmoother::enough_to_move(const VectorXd& theta) {
   MatrixXd state = disturb_;
   VectorXd answer = VectorXd::Zero(disturbances_);
   for (Index k = 1; k < samples_; ++k, state = exact_.transition.value * state) answer += (system_.C.value * state).colwise().squaredNorm().transpose();
-  const MatrixXd moves = measured_.rowwise() - measured_.colwise().mean();
-  return (moves.squaredNorm() / static_cast<double>(samples_) / answer.array().max(1e-300)).sqrt();
+  const MatrixXd readings = measured_(Eigen::seqN(0, readings_, parts_), Eigen::all), moves = readings.rowwise() - readings.colwise().mean();
+  return (moves.squaredNorm() / static_cast<double>(readings_) / answer.array().max(1e-300)).sqrt();
 }
 
 /// Forces of the laws along the trajectory, and their derivatives.

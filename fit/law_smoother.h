@@ -22,8 +22,9 @@ class LawSmoother {
   /// `parameters`: those of theta that are searched. Looks at the first `most_samples` of the run, where a decay is over.
   LawSmoother(const RunResidual& run, std::vector<Eigen::Index> parameters);
   static constexpr Eigen::Index most_samples = 20000;
+  static constexpr Eigen::Index most_parts = 4;  ///< of a sample, where a law asks for small steps
 
-  Eigen::Index samples() const { return samples_; }
+  Eigen::Index samples() const { return readings_; }
   Eigen::Index coordinates() const { return system_.coordinates; }
 
   /// Per disturbance: white ones of this r.m.s. move the channels as much as they are seen to move.
@@ -61,7 +62,7 @@ class LawSmoother {
   std::vector<Eigen::Index> free_;
   LinearSystem system_;
   ExactStep exact_;
-  Eigen::Index samples_ = 0, channels_ = 0, changes_ = 0, states_ = 0, laws_ = 0, disturbances_ = 0;
+  Eigen::Index readings_ = 0, parts_ = 1, samples_ = 0, channels_ = 0, changes_ = 0, states_ = 0, laws_ = 0, disturbances_ = 0;
   Eigen::MatrixXd gamma0_, gamma1_, disturb_, sees_;
 
   bool followed_ = false;

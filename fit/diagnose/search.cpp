@@ -164,13 +164,14 @@ bool decays_decide(const Trial& trial) { return takes_small_steps(trial.arrival.
 
 bool fit_decays_first(Trial& trial, const Trial& base) {
   JointProblem& joint = trial.arrival.joint;
-  constexpr double followed = 2, worth_it = 0.5;
-  if (!has_decays(joint) || left_of_decays(base) < followed) {
+  constexpr double worth_it = 0.5;
+  const double before = left_of_decays(base), followed = takes_small_steps(joint) ? 1.15 : 2;  // corners are seen where a fit with everything free loses its way
+  if (!has_decays(joint) || before < followed) {
     measure(trial);
     return true;
   }
   const double left = fit_decays(joint, trial.effects.back());
-  const bool helps = left < worth_it * left_of_decays(base);
+  const bool helps = left - 1 < worth_it * (before - 1);
   if (takes_small_steps(joint)) trial.decays_left = left;
   measure(trial);
   if (helps)
