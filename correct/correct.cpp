@@ -73,7 +73,16 @@ std::vector<MotionBasis::Window> generous_windows(const Run& run) {
 Search estimate(RunResidual& residual, const Prior& prior, const VectorXd& start, MatrixXd& rough) {
   constexpr double roughly = 1, well = 1e-3;  // of a chi-square whose own scatter is some tens
   residual.differentiate_only(prior.free);
-  const VectorXd theta = minimise(residual, prior, start, roughly, false).solution.theta;
+  RunResidual followed = residual;
+  Search first = minimise(residual, prior, start, roughly, false);
+  if (followed.find_linear(start)) {  // dry friction that lets go at another time is another minimum: once more from a motion that was found along the record
+    Search other = minimise(followed, prior, start, roughly, false);
+    if (other.solution.chi2 < first.solution.chi2) {
+      residual = std::move(followed);
+      first = std::move(other);
+    }
+  }
+  const VectorXd theta = first.solution.theta;
   residual.settle_noise(theta);
   residual.reject_spikes(theta);
   rough = motion_prior(residual, theta);
@@ -201,7 +210,6 @@ CorrectResult correct(const CorrectProblem& problem) {
   const AeroelasticModel model = free_model(problem, length);
 
   RunResidual residual(model, run, windows);
-  residual.search_exactly(true);  // the error of the load is that of the motion, and dry friction that lets go is far from any line
   const VectorXd start = theta_for(model, problem.fit, run.file);
   MatrixXd rough;
   const Search free = estimate(residual, prior_of(model, problem.fit, start, run.file), start, rough);

@@ -156,7 +156,8 @@ RunResidual::NonlinearPoint RunResidual::first_nonlinear_point(const Linearised&
   if (!std::isfinite(best.chi2)) consider(without_laws(lin));
   if (glance_) return best;
   constexpr double followed = 2;
-  if ((motion_.unknowns() == 0 || from_afar_) && best.chi2 * tempered_ * tempered_ > followed * static_cast<double>(degrees_of_freedom()))
+  const bool lost = motion_.unknowns() == 0 && best.chi2 * tempered_ * tempered_ > followed * static_cast<double>(degrees_of_freedom());
+  if (lost || from_afar_)
     if (NonlinearPoint grown = along_growing_record(lin, theta, best); grown.chi2 < best.chi2) return grown;
   return best;
 }
@@ -247,11 +248,13 @@ void RunResidual::follow_nonlinear_partials(const LinearSystem& system, const Ve
   }
 }
 
-void RunResidual::find_linear(const VectorXd& theta) {
+bool RunResidual::find_linear(const VectorXd& theta) {
+  if (model_->system(conditions_, theta, channels_).feedback.empty()) return false;
   from_afar_ = true;
   solve(theta);
   from_afar_ = false;
   guide_ = {};
+  return true;
 }
 
 bool RunResidual::takes_small_steps(const VectorXd& theta) const {

@@ -158,8 +158,8 @@ class RunResidual {
   void glance(bool only) { glance_ = only; }
 
   /// Moves c of a nonlinear run with prescribed motion to the least chi-square that exact tangents reach over a record that grows, at theta. For laws with corners that
-  /// the rig crosses all the time (freeplay).
-  void find_linear(const Eigen::VectorXd& theta);
+  /// the rig crosses all the time (freeplay), or that it leaves and meets again (friction). False, and nothing done, where the model is linear.
+  bool find_linear(const Eigen::VectorXd& theta);
   /// Whether following the model takes several steps a sample, which makes exact tangents dear.
   bool takes_small_steps(const Eigen::VectorXd& theta) const;
 
