@@ -32,18 +32,18 @@ MatrixXd differences(const MotionBasis& motion, const MotionBasis::Window& windo
   return c;
 }
 
-/// Neighbouring differences that share a scale: rows over the few unknowns that they touch, from `first` on.
+/// Neighbouring differences that share a scale: rows over the few unknowns that they touch, from `first` on; the window's first knot, and its stride.
 struct Group {
   MatrixXd rows;
-  Index first, window;
+  Index first, window, stride;
 };
 
 /// Empty where nothing moves.
-Group touched(const MatrixXd& rows, Index window) {
+Group touched(const MatrixXd& rows, const MotionBasis::Window& window) {
   Index first = 0, last = rows.cols();
   while (first < last && rows.col(first).isZero(0)) ++first;
   while (last > first && rows.col(last - 1).isZero(0)) --last;
-  return {rows.middleCols(first, last - first), first, window};
+  return {rows.middleCols(first, last - first), first, window.knots.first, window.stride};
 }
 
 /// Each group at least as wide as the wider of its neighbours in the same window: a motion that begins between two samples turns from smooth to rough within a group, and the
@@ -64,9 +64,9 @@ struct Roughness {
 };
 
 /// 1 / tau_g^2 with the largest  sum_g -(gamma_g ln tau_g^2 + sum d^2 / tau_g^2) / 2 - sum_g (ln tau_g^2 - ln tau_(g-1)^2)^2 / (2 spread^2),  the second sum over neighbours in
-/// a window: Newton's method in ln tau^2, a tridiagonal system.
+/// a window, spread = their stride: a motion that dies away like exp(-t / 10 samples) changes tau^2 by e over five samples. Newton's method in ln tau^2, a tridiagonal system.
 std::vector<double> most_probable(const std::vector<Group>& groups, const std::vector<Roughness>& found, const std::vector<double>& precision, double floor) {
-  constexpr double spread = 1, longest = 2, arrived = 1e-3;  // of ln tau^2
+  constexpr double longest = 2, arrived = 1e-3;  // of ln tau^2
   constexpr int steps = 50;
   const auto count = static_cast<Index>(groups.size());
   VectorXd level = -Eigen::Map<const VectorXd>(precision.data(), count).array().log();  // ln tau^2
@@ -78,10 +78,10 @@ std::vector<double> most_probable(const std::vector<Group>& groups, const std::v
       slope[g] = 0.5 * (own.determined - in_scales);
       diagonal[g] = 0.5 * std::max(in_scales, 0.5 * own.determined);
       if (g == 0 || groups[static_cast<std::size_t>(g)].window != groups[static_cast<std::size_t>(g - 1)].window) continue;
-      const double off = (level[g] - level[g - 1]) / (spread * spread);
+      const double spread = static_cast<double>(groups[static_cast<std::size_t>(g)].stride), alike = 1 / (spread * spread), off = alike * (level[g] - level[g - 1]);
       slope[g] += off, slope[g - 1] -= off;
-      diagonal[g] += 1 / (spread * spread), diagonal[g - 1] += 1 / (spread * spread);
-      beside[g] = -1 / (spread * spread);
+      diagonal[g] += alike, diagonal[g - 1] += alike;
+      beside[g] = -alike;
     }
     for (Index g = 1; g < count; ++g) {
       const double share = beside[g] / diagonal[g - 1];
@@ -110,7 +110,7 @@ MatrixXd motion_prior(const RunResidual& residual, const VectorXd& theta) {
     const MatrixXd d = differences(motion, window);
     const Index size = group_size * window.stride;
     for (Index first = 0; first < d.rows(); first += size) {
-      Group group = touched(d.middleRows(first, std::min(size, d.rows() - first)), window.knots.first);
+      Group group = touched(d.middleRows(first, std::min(size, d.rows() - first)), window);
       if (group.rows.cols() > 0) groups.push_back(std::move(group));
     }
   }
@@ -138,7 +138,7 @@ MatrixXd motion_prior(const RunResidual& residual, const VectorXd& theta) {
     const MatrixXd root = llt.matrixL().solve(MatrixXd(scale.asDiagonal()));  // root^T root = posterior^-1
     double change = 0;
     for (std::size_t g = 0; g < groups.size(); ++g) {
-      const auto& [rows, first, window] = groups[g];
+      const auto& [rows, first, window, stride] = groups[g];
       const double left_open = (root.middleCols(first, rows.cols()) * rows.transpose()).squaredNorm();
       found[g].determined = std::max(1e-3, static_cast<double>(rows.rows()) - precision[g] * left_open);
       found[g].squares = (rows * c.segment(first, rows.cols())).squaredNorm();
