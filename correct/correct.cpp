@@ -47,7 +47,8 @@ std::vector<std::string> effects_of_the_rig(const FittedRig& fit) {
 /// The coupled model with a free build-up of circulation.
 AeroelasticModel free_model(const CorrectProblem& problem, double semichords) {
   const Run& run = problem.run;
-  const VectorXd rates = spread_rates(semichords);
+  constexpr double beyond_the_record = 5;  // slower rates: what the limit still hides at its end
+  const VectorXd rates = spread_rates(beyond_the_record * semichords);
   const Basis basis = problem.fit.normal_modes > 0 ? make_basis(problem.rig, problem.fit.normal_modes, problem.fit.torsion_modes)
                                                    : make_basis(problem.rig, 0.5 / run.dt, run.density);
   const AeroelasticModel model =

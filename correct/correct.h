@@ -53,7 +53,7 @@ struct CorrectResult {
 
 /// The load of a rigid rig out of a gauge record, and the indicial response, without assuming Wagner's shape.
 ///
-/// The build-up of circulation is 1 - sum_k A_k exp(-beta_k s) with rates beta_k spread evenly over ln s and free amplitudes: it acts in the load of
+/// The build-up of circulation is 1 - sum_k A_k exp(-beta_k s) with rates beta_k spread evenly over ln s, also slower than the record is long, and free amplitudes: it acts in the load of
 /// the prescribed motion and in that of the rig's own motion, both at once in the coupled model. Amplitudes, slope and motion are estimated together from
 /// gauge and angle. Each amplitude has a normal prior around zero whose standard deviation maximises the evidence (correct/prior.h); it decides what the
 /// record leaves open. The answers at half and at twice its weight, 1/tau^2, are part of the result.

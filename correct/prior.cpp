@@ -65,7 +65,7 @@ std::pair<VectorXd, MatrixXd> linear_model(const RunResidual::Evaluation& e, con
 
 MatrixXd Prior::regularisation() const {
   MatrixXd rows = MatrixXd::Zero(static_cast<Index>(amplitudes.size()), known.cols());
-  for (std::size_t k = 0; k < amplitudes.size(); ++k) rows(static_cast<Index>(k), amplitudes[k]) = 1 / amplitude;
+  for (std::size_t k = 0; k < amplitudes.size(); ++k) rows(static_cast<Index>(k), amplitudes[k]) = 1 / (amplitude * share[static_cast<Index>(k)]);
   return rows;
 }
 
@@ -113,6 +113,8 @@ Prior prior_of(const AeroelasticModel& model, const FittedRig& fit, const Vector
   std::vector<Index> rig;
   for (Index j = 0; j < theta.size(); ++j) (model.parameters()[static_cast<std::size_t>(j)].per_run ? prior.free : rig).push_back(j);
   for (Index k = 0; k < model.circulation().rate.size(); ++k) prior.amplitudes.push_back(model.circulation_parameter(k));
+  constexpr double slow = 0.05;  // per semichord
+  prior.share = (model.circulation().rate.array() / slow).min(1.0);
   const MatrixXd root = root_of(rig_covariance(model, fit, theta, rig, run_file));
   if (took_part(fit, run_file)) {
     prior.held = rig;
@@ -192,7 +194,7 @@ Evidence evidence(const RunResidual::Evaluation& e, const Prior& prior, const Ve
   for (int round = 0; round < 100; ++round) {
     MatrixXd stack = MatrixXd::Zero(known.rows() + static_cast<Index>(place.size()), count);
     stack.topRows(known.rows()) = known;
-    for (std::size_t k = 0; k < place.size(); ++k) stack(known.rows() + static_cast<Index>(k), place[k]) = 1 / result.amplitude;
+    for (std::size_t k = 0; k < place.size(); ++k) stack(known.rows() + static_cast<Index>(k), place[k]) = 1 / (result.amplitude * prior.share[static_cast<Index>(k)]);
     VectorXd target = VectorXd::Zero(stack.rows());
     target.head(known.rows()) = right;
     const Eigen::ColPivHouseholderQR<MatrixXd> qr(stack * scale.asDiagonal());
@@ -200,7 +202,11 @@ Evidence evidence(const RunResidual::Evaluation& e, const Prior& prior, const Ve
     const MatrixXd inverse = qr.matrixR().topRows(count).triangularView<Eigen::Upper>().solve(MatrixXd::Identity(count, count));
     const MatrixXd root = scale.asDiagonal() * (qr.colsPermutation() * inverse);
     double left_open = 0, size = 0;
-    for (const Index p : place) left_open += root.row(p).squaredNorm(), size += best[p] * best[p];
+    for (std::size_t k = 0; k < place.size(); ++k) {
+      const double share = prior.share[static_cast<Index>(k)];
+      left_open += root.row(place[k]).squaredNorm() / (share * share);
+      size += std::pow(best[place[k]] / share, 2);
+    }
     result.determined = static_cast<double>(place.size()) - left_open / (result.amplitude * result.amplitude);
     const double next = std::clamp(std::sqrt(size / std::max(result.determined, 1e-3)), least, most), change = std::abs(std::log(next / result.amplitude));
     result.amplitude = next;

@@ -16,7 +16,9 @@ namespace unrig {
 /// given rig parameters the rest follows from the run alone. Otherwise they are `free` with the fit as prior, so that the run may still improve them.
 /// A rig parameter that the fit could not determine is uncertain by its whole value. The run's own parameters (slope and others) are free without prior.
 ///
-/// Amplitudes of the circulation: each normal around zero with standard deviation `amplitude`, chosen by evidence.
+/// Amplitudes of the circulation: each normal around zero with standard deviation `amplitude`, chosen by evidence, times its `share`: 1, but for rates beta below 0.05 per semichord
+/// beta / 0.05. What is left of the response then dies away like 1/s far behind the step, as behind an airfoil of infinite span, and a wing's does faster; what no record is long
+/// enough to show of the limit is in the band.
 ///
 /// What the user imposes: a value of phi(0) is one more known row, with a standard deviation of a millionth; `rising` are rows over theta that may not become negative.
 struct Prior {
@@ -26,6 +28,7 @@ struct Prior {
   Eigen::MatrixXd rising;       ///< rising theta >= 0
   Eigen::MatrixXd held_root;  ///< square root of the covariance of the held ones
   double amplitude = 0.5;
+  Eigen::VectorXd share;
 
   Eigen::MatrixXd regularisation() const;  ///< rows over theta: sqrt(precision) of the amplitudes
   Eigen::MatrixXd rows() const;            ///< both

@@ -82,7 +82,7 @@ TEST(Indicial, ResponseOfOneRunPredictsTheReadingOfOthers) {
   const CorrectResult from = correct(test::null_problem("step_a"));
   const test::TemporaryDirectory directory;
   const TabulatedIndicial table = read_indicial(directory.file("indicial.csv", to_indicial_csv(from)));
-  EXPECT_LT(table.miss, 1e-5);  // six digits
+  EXPECT_LT(table.miss, 1e-4);  // what rates no slower than the table is long promise (core/indicial_table.h); the estimate has slower ones
   ASSERT_TRUE(table.slope);
   EXPECT_NEAR(*table.slope, from.slope, 1e-4);
 
