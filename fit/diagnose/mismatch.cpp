@@ -83,14 +83,6 @@ VectorXd standardised_residual(const RunResidual& run, const RunResidual::Predic
   return left;
 }
 
-std::vector<VectorXd> standardised_residuals(const JointProblem& joint, std::size_t r) {
-  const RunResidual& run = joint.runs()[r];
-  const RunResidual::Prediction p = run.predict(joint.theta(r));
-  std::vector<VectorXd> all;
-  for (std::size_t c = 0; c < p.channels.size(); ++c) all.push_back(standardised_residual(run, p, c));
-  return all;
-}
-
 Mismatch locate_mismatch(const JointProblem& joint) {
   Mismatch mismatch;
   std::vector<VectorXd> residuals;

@@ -34,7 +34,4 @@ Mismatch locate_mismatch(const JointProblem& joint);
 /// The residual of fitted channel `channel` of a run in units of its noise, untempered; 0 where left out.
 Eigen::VectorXd standardised_residual(const RunResidual& run, const RunResidual::Prediction& prediction, std::size_t channel);
 
-/// Of all fitted channels of run `run`, where the fit stands.
-std::vector<Eigen::VectorXd> standardised_residuals(const JointProblem& joint, std::size_t run);
-
 }  // namespace unrig

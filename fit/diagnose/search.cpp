@@ -30,19 +30,37 @@ struct LeftOfRun {
   double variance = 0;     // residual power over noise power
   double samples = 0;
   double independent = 0;  // of them, as the residual's colour says
+  double angle_variance = 1, angle_samples = 0;
 };
+
+/// A law that is missing bends the motion too, within the noise of the angle.
+void look_at_angle(const RunResidual& run, const RunResidual::Prediction& p, LeftOfRun& left) {
+  if (run.motion().unknowns() == 0) return;
+  const VectorXd& angle = run.run().channel("alpha").value;
+  double power = 0;
+  for (Index k = 0; k < angle.size(); ++k) {
+    if (!(run.angle_weight()[k] > 0) || !std::isfinite(angle[k])) continue;
+    power += std::pow(run.angle_weight()[k] * (angle[k] - p.motion.angle[k] - p.angle_offset[0]), 2);
+    ++left.angle_samples;
+  }
+  left.angle_variance = power / left.angle_samples;
+}
 
 std::vector<LeftOfRun> left_of_runs(const JointProblem& joint) {
   std::vector<LeftOfRun> all(joint.runs().size());
   in_parallel(all.size(), [&](std::size_t r) {
-    const std::vector<VectorXd> left = standardised_residuals(joint, r);
+    const RunResidual& run = joint.runs()[r];
+    const RunResidual::Prediction p = run.predict(joint.theta(r));
     double power = 0;
-    for (const VectorXd& channel : left) {
-      power += channel.squaredNorm();
-      all[r].samples += static_cast<double>((channel.array() != 0).count());
+    for (std::size_t c = 0; c < p.channels.size(); ++c) {
+      const VectorXd left = standardised_residual(run, p, c);
+      power += left.squaredNorm();
+      all[r].samples += static_cast<double>((left.array() != 0).count());
+      if (c == 0) all[r].independent = independent_share(left);
     }
     all[r].variance = power / all[r].samples;
-    all[r].independent = all[r].samples * independent_share(left.front());
+    all[r].independent *= all[r].samples;
+    look_at_angle(run, p, all[r]);
   });
   return all;
 }
@@ -88,12 +106,16 @@ void measure(Trial& trial) {
   JointProblem& joint = trial.arrival.joint;
   trial.variance.clear();
   trial.samples.clear();
+  trial.angle_variance.clear();
+  trial.angle_samples.clear();
   trial.variables = 0;
   const std::vector<LeftOfRun> left = left_of_runs(joint);
   for (std::size_t r = 0; r < left.size(); ++r) {
     const bool as_trusted = trial.decays_left > 0 && std::isfinite(trial.decays_left) && joint.runs()[r].motion().unknowns() == 0;
     trial.variance.push_back(as_trusted ? std::max(1.0, trial.decays_left) : left[r].variance);
     trial.samples.push_back(left[r].independent);
+    trial.angle_variance.push_back(left[r].angle_variance);
+    trial.angle_samples.push_back(left[r].angle_samples);
     trial.variables += static_cast<int>(joint.runs()[r].linear_unknowns());
   }
   for (const Unknown& u : joint.unknowns()) trial.variables += u.held ? 0 : 1;
@@ -128,6 +150,7 @@ double bic_difference(const Trial& a, const Trial& b) {
   double difference = 0, total = 0;
   for (std::size_t r = 0; r < a.variance.size(); ++r) {
     difference += better.samples[r] * std::log(a.variance[r] / b.variance[r]);
+    if (a.angle_samples[r] > 0) difference += b.angle_samples[r] * std::log(a.angle_variance[r] / b.angle_variance[r]);
     total += better.samples[r];
   }
   return difference + (a.variables - b.variables) * std::log(total);

@@ -14,13 +14,14 @@ struct Trial {
   double score = 0;               ///< share of chi-square that one linear step promised to remove, at the noise levels of the time
   std::vector<double> variance = {};   ///< per run: residual power over noise power
   std::vector<double> samples = {};    ///< per run: as many of them as the residual's colour leaves independent
+  std::vector<double> angle_variance = {}, angle_samples = {};  ///< the same of the angle, where the motion is estimated; no samples elsewhere
   int variables = 0;
   double decays_left = 0;  ///< where decays decide: what fit_decays left of them; 0: not asked
 
   double reduced_chi2() const;    ///< over all runs, in units of the noise
 };
 
-/// -2 ln likelihood with each run's own variance, plus ln(samples) per variable, of `a` less that of `b` (G. Schwarz, Annals of Statistics 6 (1978) 461). Samples count
+/// -2 ln likelihood of gauge and angle with each run's own variances, plus ln(samples) per variable, of `a` less that of `b` (G. Schwarz, Annals of Statistics 6 (1978) 461). Samples count
 /// by the colour of the better of the two.
 double bic_difference(const Trial& a, const Trial& b);
 
