@@ -197,8 +197,8 @@ void RunResidual::solve_nonlinear(Linearised& lin, const VectorXd& theta) const 
 
 /// Levenberg-Marquardt steps in c: a full Gauss-Newton step where chi-square falls by it, else the more damped the longer it does not.
 void RunResidual::search_along_tangents(Linearised& lin, const VectorXd& theta, NonlinearPoint point) const {
-  constexpr int a_glance = 2, full_search = 30;
-  const int most = glance_ ? a_glance : full_search;
+  constexpr int a_glance = 2, nearby = 8, far_away = 30;  // a motion is searched again at the next theta
+  const int most = glance_ ? a_glance : motion_.unknowns() > 0 && !from_afar_ ? nearby : far_away;
   constexpr double least_damping = 1e-4, most_damping = 1e4, growth = 10;
   double damping = 0;
   for (int i = 0; i < most; ++i) {

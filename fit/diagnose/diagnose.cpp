@@ -7,6 +7,7 @@
 
 #include "core/effects/effect.h"
 #include "core/in_parallel.h"
+#include "fit/decays_first.h"
 #include "fit/diagnose/heldout.h"
 #include "fit/diagnose/search.h"
 #include "fit/fit_description.h"
@@ -116,7 +117,8 @@ Trials try_one_more(const DiagnoseProblem& problem, const FitProblem& fit_proble
     fit_nonlinear(others, base);
     done = done || any_leaves_nothing(others);
     if (!done && !favours_linear) fit_anew(fit_problem, linear);
-    if (!done && !any_leaves_nothing(linear)) fit_anew(fit_problem, others);
+    const bool decays_have_told = has_decays(base.arrival.joint);  // from first guesses nonlinear laws are not found where their decays do not lead
+    if (!done && !decays_have_told && !any_leaves_nothing(linear)) fit_anew(fit_problem, others);
     std::move(others.begin(), others.end(), std::back_inserter(linear));
     if (!any_leaves_nothing(linear)) {  // far from the truth one linear step promises little of what there is
       fit_anew(fit_problem, unpromising);
