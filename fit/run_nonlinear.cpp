@@ -197,7 +197,7 @@ void RunResidual::solve_nonlinear(Linearised& lin, const VectorXd& theta) const 
 
 /// Levenberg-Marquardt steps in c: a full Gauss-Newton step where chi-square falls by it, else the more damped the longer it does not.
 void RunResidual::search_along_tangents(Linearised& lin, const VectorXd& theta, NonlinearPoint point) const {
-  constexpr int a_glance = 2, nearby = 8, far_away = 30;  // a motion is searched again at the next theta
+  constexpr int a_glance = 2, nearby = 15, far_away = 30;  // a motion is searched again at the next theta
   const int most = glance_ ? a_glance : motion_.unknowns() > 0 && !from_afar_ ? nearby : far_away;
   constexpr double least_damping = 1e-4, most_damping = 1e4, growth = 10;
   double damping = 0;
