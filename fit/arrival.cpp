@@ -12,6 +12,7 @@
 #include "core/effects/effect.h"
 #include "core/in_parallel.h"
 #include "fit/first_guess.h"
+#include "fit/mode_order.h"
 #include "fit/undetermined.h"
 
 namespace unrig {
@@ -75,20 +76,33 @@ void follow(Arrival& arrival, const FitProblem& problem, const std::vector<Index
 
 constexpr double explained = 2;  // reduced chi-square of a record that a model can be said to follow
 
+/// Start values around those of `joint`: stiffness of torsion (of modal rigs: of every second mode) and of the others times a factor each, and damping ratios of modes that a
+/// resonance nearby still moves.
+void spread(JointProblem& joint, double torsion, double others) {
+  constexpr double wide = 0.03;  // a resonance three per cent wide to either side
+  const auto even_mode = [](const std::string& name) { return name.starts_with("modal[") && (std::stoi(name.substr(6)) % 2 == 0); };
+  for (Unknown& u : joint.unknowns()) {
+    const std::string& name = joint.parameter(u).name;
+    if (u.held || name.find("stiffness") == std::string::npos || belongs_to_an_effect(name)) continue;
+    u.value = std::clamp(u.value * (name.starts_with("torsion") || even_mode(name) ? torsion : others), joint.parameter(u).lower, joint.parameter(u).upper);
+    if (!name.starts_with("modal[")) continue;
+    const VectorXd theta = joint.theta(0);
+    for (Unknown& damping : joint.unknowns())
+      if (damping.parameter == u.parameter + 1 && !damping.held) damping.value = std::max(damping.value, 2 * wide * std::sqrt(u.value * theta[u.parameter - 1]));
+  }
+}
+
 /// Once more from stiffnesses around the first guess; the best after the early stages goes on.
 Arrival try_other_starts(const Arrival& start, const FitProblem& problem, const std::vector<Index>& horizons, const ArrivalEffort& effort) {
   const std::size_t early = std::min<std::size_t>(2, horizons.size() - 1);
   std::optional<Arrival> best;
   double least = std::numeric_limits<double>::infinity();
+  const bool one_stiffness = problem.rig.modal.size() == 1;
   for (const double torsion : {0.5, 1.0, 2.0})
-    for (const double normal : {0.5, 1.0, 2.0}) {
-      if (torsion == 1 && normal == 1) continue;
+    for (const double others : {0.5, 1.0, 2.0}) {
+      if ((torsion == 1 && others == 1 && !problem.rig.is_modal()) || (torsion != 1 && one_stiffness)) continue;
       Arrival other = start;
-      for (Unknown& u : other.joint.unknowns()) {
-        const std::string& name = other.joint.parameter(u).name;
-        if (u.held || name.find("stiffness") == std::string::npos) continue;
-        u.value = std::clamp(u.value * (name.starts_with("torsion") ? torsion : normal), other.joint.parameter(u).lower, other.joint.parameter(u).upper);
-      }
+      spread(other.joint, torsion, others);
       tell(problem, "trying other starts");
       follow(other, problem, horizons, 0, early, effort);
       if (const double chi2 = other.joint.chi2(); chi2 < least || !best) {
@@ -274,7 +288,13 @@ Arrival arrive(const FitProblem& problem, const std::shared_ptr<const Aeroelasti
   for (const Run& run : problem.runs) windows.push_back(problem.rig.is_modal() ? std::vector<MotionBasis::Window>{} : motion_windows(run));
   Arrival arrival = grow(first_guess(problem, model, windows, problem.start), problem, effort);
   hold_undetermined(arrival.joint);
-  return arrival;
+  Arrival renumbered = arrival;
+  if (!number_modes_by_frequency(renumbered.joint)) return arrival;
+  JointProblem::SolveOptions options;
+  options.iterations = effort.iterations;
+  solve(renumbered, options);
+  constexpr double rounding = 1e-6;
+  return renumbered.joint.chi2() < (1 + rounding) * arrival.joint.chi2() ? renumbered : arrival;
 }
 
 Arrival extend(const FitProblem& problem, const Arrival& without, const std::shared_ptr<const AeroelasticModel>& model, const std::vector<std::string>& added) {
@@ -302,19 +322,6 @@ Arrival arrive_with_effects(const FitProblem& problem, const Arrival& like, cons
   Arrival arrival = grow(first_guess(problem, like.model, like.windows, starts), problem, effort);
   hold_undetermined(arrival.joint);
   return arrival;
-}
-
-Arrival go_on_with_effects(const FitProblem& problem, const Arrival& without, const std::shared_ptr<const AeroelasticModel>& model, const ArrivalEffort& effort) {
-  const Arrival chosen = extend(problem, without, model, problem.effects);
-  Arrival arrival = chosen;
-  JointProblem::SolveOptions options;
-  options.iterations = effort.iterations;
-  solve(arrival, options);
-  if (arrival.reduced_chi2() < explained) return arrival;
-  // Without the effects the rig's parameters may have gone far astray.
-  Arrival other = arrive_with_effects(problem, chosen, effort);
-  other.evaluations += arrival.evaluations;
-  return other.reduced_chi2() < arrival.reduced_chi2() ? other : arrival;
 }
 
 void refine(Arrival& arrival, const FitProblem& problem) {

@@ -34,11 +34,7 @@ struct ArrivalEffort {
 /// From the problem's start values to the whole record by way of windows that grow from a few periods. The effects of the problem are left out.
 Arrival arrive(const FitProblem& problem, const std::shared_ptr<const AeroelasticModel>& model, const ArrivalEffort& effort = {});
 
-/// The fit goes on with effects at work, `model` being the one with them: from the best of the effects' starts. Where the values of the fit without them do not
-/// lead there, all over again with the effects from the first window on.
-Arrival go_on_with_effects(const FitProblem& problem, const Arrival& without, const std::shared_ptr<const AeroelasticModel>& model, const ArrivalEffort& effort = {});
-
-/// The same with `model` and nothing searched for yet: values of the fit `without` it where it has them, the best of their starts for the effects `added`.
+/// With `model`, the one with the effects `added`, and nothing searched for yet: values of the fit `without` them where it has them, the best of their starts for the effects.
 Arrival extend(const FitProblem& problem, const Arrival& without, const std::shared_ptr<const AeroelasticModel>& model, const std::vector<std::string>& added);
 
 /// All the way from first guesses with the effects of `model` at work from the first window on; those start from the values that `like` has for them.

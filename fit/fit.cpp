@@ -4,7 +4,10 @@
 #include <chrono>
 #include <cmath>
 
+#include <fmt/format.h>
+
 #include "fit/arrival.h"
+#include "fit/diagnose/search.h"
 #include "fit/fit_description.h"
 #include "fit/uncertainty.h"
 #include "fit/undetermined.h"
@@ -22,6 +25,14 @@ ParameterUncertainty settle(Arrival& arrival, const FitProblem& problem) {
     uncertainty = estimate_uncertainty(arrival.joint);
   }
   return uncertainty;
+}
+
+/// A run that its own unknowns take up altogether would only seem to be explained.
+void check_lengths(const Arrival& arrival) {
+  for (const RunResidual& run : arrival.joint.runs())
+    if (run.degrees_of_freedom() <= 0)
+      throw InputError({run.run().file, 0}, fmt::format("{} samples for {} unknowns of the run itself (how it starts, its zeros, its motion)", run.observations(), run.linear_unknowns()),
+                       "wanted more samples than that", "Record for several periods of the rig's lowest mode, or leave the run out.");
 }
 
 /// A name that no parameter has must not pass in silence.
@@ -80,19 +91,17 @@ FitResult describe_fit(Arrival& arrival, const FitProblem& problem, bool settled
   }
   describe_parameters(joint, uncertainty, problem.start, result);
   describe_profiles(joint, uncertainty, problem, result);
+  judge_answer(result);
   warn_of_mismatch(result);
   return result;
 }
 
 FitResult fit(const FitProblem& problem) {
   const auto begin = std::chrono::steady_clock::now();
-  const auto model = std::make_shared<const AeroelasticModel>(model_of(problem.rig, problem.runs, problem.circulation));
-  const auto complete = problem.effects.empty() ? model : std::make_shared<const AeroelasticModel>(model_of(problem.rig, problem.runs, problem.circulation, problem.effects));
-  check_names(*complete, problem);
-  ArrivalEffort effort;
-  if (!problem.effects.empty()) effort = {false, 10, 0.5, 20};  // without them the records will not be explained, however long the search
-  Arrival arrival = arrive(problem, model, effort);
-  if (!problem.effects.empty()) arrival = go_on_with_effects(problem, arrival, complete);
+  const auto model = std::make_shared<const AeroelasticModel>(model_of(problem.rig, problem.runs, problem.circulation, problem.effects));
+  check_names(*model, problem);
+  Arrival arrival = problem.effects.empty() ? arrive(problem, model) : arrive_at_effects(problem);
+  check_lengths(arrival);
   FitResult result = describe_fit(arrival, problem);
   result.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
   return result;

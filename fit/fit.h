@@ -8,6 +8,7 @@
 #include "core/rig.h"
 #include "core/run.h"
 #include "core/wagner.h"
+#include "fit/determined.h"
 #include "fit/profile.h"
 #include "fit/undetermined.h"
 
@@ -55,7 +56,10 @@ struct FittedRun {
   Eigen::Index degrees_of_freedom = 0;
   std::vector<FittedChannel> channels;  ///< the fitted outputs, then `alpha` where the motion was estimated
   double whiteness = 1;  ///< probability that white noise looks at least as coloured as the residual
+  double followed = 1;   ///< share of the readings' variance that the model follows, of the channel that it follows least
   double reduced_chi2() const { return chi2 / static_cast<double>(degrees_of_freedom); }
+  /// Whether chi-square is what noise would leave: it scatters by sqrt(2/n), the noise level that it counts in, and its square, by a few per cent.
+  bool explained() const;
 };
 
 struct ProfiledParameter {
@@ -66,6 +70,7 @@ struct ProfiledParameter {
 struct FitResult {
   bool converged = false;
   std::string message;
+  std::string no_answer;  ///< why these numbers are not to be trusted, and what to do; empty: they are
   double chi2 = 0;
   Eigen::Index observations = 0;
   Eigen::Index variables = 0;  ///< nonlinear and linear unknowns together
@@ -97,7 +102,11 @@ struct FitResult {
 /// chi-square where that exceeds one; where any is coloured, the covariance that follows from the residuals' own spectra (fit/coloured_noise.h).
 /// Both are in the result. What the runs do not determine is held; the standard errors of the others allow for as much as it may be off
 /// (fit/undetermined.h), and where that leaves nothing known of one it is not identified either: `determined` then has the combination that is.
-/// Throws InputError where a run does not belong to the rig, or a name to no parameter.
+///
+/// There is no answer (`no_answer`) where the search has not converged, a run is left with more than half of the variance of a channel and not with its noise (a wrong
+/// minimum, or not this rig), fewer than 20 degrees of freedom remain (the scatter itself is then known to worse than 1/sqrt(40)), or nothing is determined.
+/// No parameter is `identified` then.
+/// Throws InputError where a run does not belong to the rig or is too short to say more than where it starts, or a name belongs to no parameter.
 FitResult fit(const FitProblem& problem);
 
 /// The model of a set of runs: one basis, rich enough for all of them.

@@ -60,11 +60,9 @@ int fit_command(int argc, char** argv) {
   for (const std::string& warning : result.warnings) warn(warning);
   write_text(output, to_json(result));
   fmt::print("{}", report(result, least));
-  if (!result.converged) {
-    warn("the fit did not converge: " + result.message);
-    return exit_no_answer;
-  }
-  return exit_done;
+  if (result.no_answer.empty()) return exit_done;
+  warn("no trustworthy answer: " + result.no_answer);
+  return exit_no_answer;
 }
 
 }  // namespace unrig

@@ -25,6 +25,15 @@ double rms(const VectorXd& x, const VectorXd& weight) {
   return count > 0 ? std::sqrt(sum / static_cast<double>(count)) : 0;
 }
 
+/// 1 - what a prediction leaves of a channel's variance, in the samples that count.
+double share_followed(const VectorXd& reading, const VectorXd& predicted, const VectorXd& weight) {
+  const double count = static_cast<double>((weight.array() > 0).count());
+  if (count == 0) return 1;
+  const auto counts = [&](const VectorXd& x) -> VectorXd { return (weight.array() > 0).select(x, 0); };
+  const double mean = counts(reading).sum() / count, varies = rms(reading.array() - mean, weight), left = rms(reading - predicted, weight);
+  return varies > 0 ? 1 - left * left / (varies * varies) : 1;
+}
+
 /// Covariance of all unknowns (zero for those held) once what is held may be off by its ignorance. Unknowns that are lost with it are not identified:
 /// their covariance stays what it is with the others held.
 MatrixXd covariance_of_all(const JointProblem& joint, const ParameterUncertainty& uncertainty, const HeldInfluence& influence, std::vector<bool>& identified) {
@@ -88,6 +97,8 @@ MatrixXd correlation_of(const MatrixXd& covariance) {
 
 }  // namespace
 
+bool FittedRun::explained() const { return reduced_chi2() < 1.2 + 5 * std::sqrt(2 / static_cast<double>(degrees_of_freedom)); }
+
 FittedRun describe_run(const RunResidual& residual, const VectorXd& theta, double chi2) {
   const Run& run = residual.run();
   const RunResidual::Prediction p = residual.predict(theta);
@@ -107,8 +118,11 @@ FittedRun describe_run(const RunResidual& residual, const VectorXd& theta, doubl
     c.noise = noise;
     fitted.channels.push_back(c);
   };
-  for (std::size_t c = 0; c < p.channels.size(); ++c)
-    add(p.channels[c], p.output.col(static_cast<Index>(c)), residual.channel_weight(c), residual.sigma(c));
+  for (std::size_t c = 0; c < p.channels.size(); ++c) {
+    const VectorXd predicted = p.output.col(static_cast<Index>(c));
+    add(p.channels[c], predicted, residual.channel_weight(c), residual.sigma(c));
+    fitted.followed = std::min(fitted.followed, share_followed(run.channel(p.channels[c]).value, predicted, residual.channel_weight(c)));
+  }
   if (p.motion.angle.size() > 0) {
     add("alpha", p.motion.angle.array() + p.angle_offset[0], residual.angle_weight(), residual.angle_sigma());
     fitted.channels.back().spikes = residual.spikes();
@@ -123,8 +137,8 @@ void describe_parameters(const JointProblem& joint, const ParameterUncertainty& 
   const HeldInfluence influence = held_influence(joint);
   std::vector<bool> identified(joint.unknowns().size(), true);
   MatrixXd covariance = covariance_of_all(joint, uncertainty, influence, identified);
-  VectorXd with_others_held = VectorXd::Zero(all);
-  with_others_held(uncertainty.free) = uncertainty.covariance().diagonal().cwiseSqrt();
+  MatrixXd with_others_held = MatrixXd::Zero(all, all);
+  with_others_held(uncertainty.free, uncertainty.free) = uncertainty.covariance();
   result.determined = determined_combinations(joint, influence, with_others_held);
 
   for (Index i = 0; i < all; ++i) {
@@ -186,11 +200,40 @@ void describe_profiles(const JointProblem& joint, const ParameterUncertainty& un
   }
 }
 
+void judge_answer(FitResult& result) {
+  constexpr Index enough = 20;
+  constexpr double half = 0.5;
+  const Index freedom = result.observations - result.variables;
+  const auto known = [](const FittedParameter& p) { return p.identified; };
+  const auto lost = std::find_if(result.runs.begin(), result.runs.end(), [](const FittedRun& run) { return run.followed < half && !run.explained(); });
+  std::string advice;
+  if (!result.converged) {
+    result.no_answer = "the fit did not converge: " + result.message;
+    advice = "The fit did not converge. ";
+  } else if (freedom < enough) {
+    result.no_answer = fmt::format("{} samples leave {} degrees of freedom beside {} unknowns, too few to tell noise from signal. Record for several periods of the lowest mode.", result.observations, freedom, result.variables);
+    advice = "These runs are too short. ";
+  } else if (lost != result.runs.end()) {
+    result.no_answer = fmt::format("{}: the model follows only {:.0f} % of the variance of this run. The search ended in a wrong minimum, or this is not a run of this rig. Check rig file and run, give start values (--start), or "
+                                   "leave the run out.", lost->file, 100 * std::max(0.0, lost->followed));
+    advice = "The fit does not follow its runs. ";
+  } else if (std::none_of(result.parameters.begin(), result.parameters.end(), known) && result.determined.empty()) {
+    result.no_answer = "these runs determine no parameter";
+    for (const FittedParameter& p : result.parameters)
+      if (!p.advice.empty()) { result.no_answer += ". " + p.name + ": " + p.advice; break; }
+    return;
+  }
+  if (result.no_answer.empty()) return;
+  for (FittedParameter& p : result.parameters) {
+    if (!p.identified) continue;
+    p.identified = false;
+    p.advice = advice + what_to_record(p.name);
+  }
+}
+
 void warn_of_mismatch(FitResult& result) {
   for (const FittedRun& run : result.runs) {
-    // Chi-square scatters by sqrt(2/n), the noise level that it counts in, and its square, by a few per cent.
-    const double expected = 1.2 + 5 * std::sqrt(2 / static_cast<double>(run.degrees_of_freedom));
-    if (run.reduced_chi2() < expected) continue;
+    if (run.explained()) continue;
     std::string which;
     for (const FittedChannel& c : run.channels)
       if (c.rms_residual > 1.1 * c.noise) which += fmt::format("{}{} is left with {:.3g} {}, its noise is {:.3g}", which.empty() ? "" : ", ", c.name, c.rms_residual, c.unit, c.noise);

@@ -21,6 +21,9 @@ void describe_parameters(const JointProblem& joint, const ParameterUncertainty& 
 /// the coloured variance over the plain one.
 void describe_profiles(const JointProblem& joint, const ParameterUncertainty& uncertainty, const FitProblem& problem, FitResult& result);
 
+/// Whether there is a trustworthy answer (FitResult::no_answer); where not, nothing is identified.
+void judge_answer(FitResult& result);
+
 /// Warns of every run that the model does not explain to its noise: the error bars cannot tell how far that takes the parameters.
 void warn_of_mismatch(FitResult& result);
 

@@ -39,6 +39,7 @@ std::string to_json(const FitResult& r) {
   out["rig"] = r.rig_file;
   out["converged"] = r.converged;
   out["message"] = r.message;
+  if (!r.no_answer.empty()) out["no_answer"] = r.no_answer;
   out["reduced_chi2"] = number(r.reduced_chi2());
   out["chi2"] = number(r.chi2);
   out["observations"] = r.observations;
@@ -86,7 +87,8 @@ std::string to_json(const FitResult& r) {
                           {"rms_residual", number(c.rms_residual)}, {"noise", number(c.noise)}});
     const FittedChannel& first = run.channels.front();
     out["runs"].push_back({{"file", run.file}, {"samples", run.samples}, {"rms_residual", number(first.rms_residual)}, {"noise", number(first.noise)},
-                           {"unit", first.unit}, {"reduced_chi2", number(run.reduced_chi2())}, {"whiteness", number(run.whiteness)}, {"channels", channels}});
+                           {"unit", first.unit}, {"reduced_chi2", number(run.reduced_chi2())}, {"whiteness", number(run.whiteness)}, {"explained", run.explained()},
+                           {"followed", number(run.followed)}, {"channels", channels}});
   }
   out["warnings"] = r.warnings;
   return out.dump(2) + "\n";
@@ -180,7 +182,7 @@ std::string report(const FitResult& r, double least) {
   line("Akaike info crit", fmt::format("{:.2f}", r.aic()));
   line("Bayesian info crit", fmt::format("{:.2f}", r.bic()));
   line("standard errors", r.coloured ? "residuals coloured: from their own spectra (for white ones in brackets)" : "residuals white");
-  if (!r.converged) text += "    NOT CONVERGED: " + r.message + "\n";
+  if (!r.no_answer.empty()) text += "    NO TRUSTWORTHY ANSWER: " + r.no_answer + "\n";
 
   std::size_t width = 0;
   for (const FittedParameter& p : r.parameters) width = std::max(width, label(p).size());

@@ -8,8 +8,6 @@
 
 #include <fmt/format.h>
 
-#include "fit/identifiability.h"
-
 namespace unrig {
 using Eigen::Index;
 using Eigen::MatrixXd;
@@ -122,36 +120,6 @@ HeldInfluence held_influence(const JointProblem& joint) {
     influence.shift.col(h) = ignorance(joint.parameter(unknowns[which]), unknowns[which].value) * influence.slope.col(h);
   }
   return influence;
-}
-
-std::vector<DeterminedCombination> determined_combinations(const JointProblem& joint, const HeldInfluence& influence, const VectorXd& std_error) {
-  constexpr double noticeable = 3;
-  std::vector<DeterminedCombination> all;
-  const auto& unknowns = joint.unknowns();
-  for (std::size_t i = 0; i < unknowns.size(); ++i) {
-    const auto row = static_cast<Index>(i);
-    DeterminedCombination c;
-    Tie tie{short_name(joint, unknowns[i]), unknowns[i].value, {}, {}, {}};
-    c.unknowns.push_back(i);
-    double most = 0;
-    for (std::size_t h = 0; h < influence.held.size(); ++h) {
-      const auto column = static_cast<Index>(h);
-      const double shift = std::abs(influence.shift(row, column));
-      if (!(shift > noticeable * std_error[row])) continue;
-      const Unknown& held = unknowns[influence.held[h]];
-      c.unknowns.push_back(influence.held[h]);
-      c.slope.push_back(influence.slope(row, column));
-      tie.add(short_name(joint, held), held.value, influence.slope(row, column));
-      if (shift > most) most = shift, c.settled_by = what_to_record(joint.parameter(held).name);
-    }
-    if (c.slope.empty()) continue;
-    c.combination = tie.determined();
-    c.product = tie.is_product();
-    c.value = tie.value();
-    c.std_error = std_error[row] * tie.gain();
-    all.push_back(std::move(c));
-  }
-  return all;
 }
 
 std::string short_name(const JointProblem& joint, const Unknown& unknown) {

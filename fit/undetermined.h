@@ -9,7 +9,7 @@
 
 namespace unrig {
 
-/// What recordings cannot say: which unknowns of a joint fit are held, what the others owe to them, and which combinations are determined.
+/// What recordings cannot say: which unknowns of a joint fit are held, what the others owe to them; which combinations are determined: fit/determined.h.
 
 /// Unknowns that no run responds to, or only through a combination of others, are held where they are. Of a degenerate set the masses go first:
 /// a free decay fixes stiffness and damping per mass, and the mass of a structure is what is best known from drawings.
@@ -26,17 +26,6 @@ double start_of(const Parameter& parameter, const StartValues& starts);
 /// first: of two that are only determined together, one is enough. Returns whether any was held.
 bool hold_weak(JointProblem& joint, const ParameterUncertainty& uncertainty, const StartValues& starts);
 
-/// A combination of unknowns that the runs determine, although they do not determine each by itself.
-struct DeterminedCombination {
-  std::string combination;  ///< "modal[1].stiffness / modal[1].mass"
-  double value = 0;
-  double std_error = 0;
-  std::vector<std::size_t> unknowns;  ///< first the one that follows, then those held
-  std::vector<double> slope;          ///< of the first with each of the held ones, where the runs do not notice
-  bool product = false;               ///< of powers, exponents -slope held / value; else first - sum of slope times held
-  std::string settled_by;             ///< the recording that would tell them apart
-};
-
 /// How a finished fit depends on the values that some unknowns are held at.
 struct HeldInfluence {
   std::vector<std::size_t> held;  ///< unknowns that are held although the runs respond to them
@@ -44,9 +33,6 @@ struct HeldInfluence {
   Eigen::MatrixXd shift;          ///< the same times the ignorance of the held one
 };
 HeldInfluence held_influence(const JointProblem& joint);
-
-/// Of every unknown that a held one can shift by more than three of its own standard errors (`std_error`, of all unknowns, with the others held).
-std::vector<DeterminedCombination> determined_combinations(const JointProblem& joint, const HeldInfluence& influence, const Eigen::VectorXd& std_error);
 
 /// "normal_force_slope (step_a.csv)", without folders.
 std::string short_name(const JointProblem& joint, const Unknown& unknown);

@@ -18,7 +18,6 @@ namespace {
 using Eigen::Index;
 using Strings = std::vector<std::string>;
 
-constexpr double explained = 1.15;     // residual power over noise power of a model that leaves nothing to name
 constexpr double nearly_all = 0.97;    // share of the excess that an effect must remove to be named where something remains
 constexpr double half = 0.5;           // of the excess, where decays decide: the search leaves something of the other runs even when it has found what is missing
 constexpr double nearly_explained = 10, twice_the_noise = 2;
@@ -40,15 +39,6 @@ Strings candidates(const DiagnoseProblem& problem, const JointProblem& joint, co
   return ids;
 }
 
-bool nonlinear(const Trial& trial) {
-  const JointProblem& joint = trial.arrival.joint;
-  for (std::size_t r = 0; r < joint.runs().size(); ++r)
-    if (joint.runs()[r].largest_arguments(joint.theta(r)).size() > 0) return true;
-  return false;
-}
-
-bool leaves_nothing(const Trial& trial) { return trial.reduced_chi2() < explained; }
-
 /// Some trials, the best first once they are fitted.
 using Trials = std::vector<Trial>;
 
@@ -64,10 +54,7 @@ void fit_nonlinear(Trials& trials, const Trial& base) {
   double least = base.reduced_chi2();
   for (std::size_t i = 0; i < trials.size(); ++i) {
     Trial& trial = trials[i];
-    if (fit_decays_first(trial, base) && !decays_decide(trial)) {
-      fit_fully(trial, 2);
-      if (trial.reduced_chi2() < least) fit_fully(trial, 6);
-    }
+    follow_nonlinear(trial, base, least);
     least = std::min(least, trial.reduced_chi2());
     if (!leaves_nothing(trial) || base.reduced_chi2() < nearly_explained) continue;
     trials.erase(trials.begin() + static_cast<std::ptrdiff_t>(i) + 1, trials.end());

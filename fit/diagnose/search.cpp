@@ -133,7 +133,27 @@ double left_of_decays(const Trial& trial) {
   return power / count;
 }
 
+/// The effects of a problem: those that are linear in every run, then each of the others by itself.
+std::vector<std::vector<std::string>> in_order(const FitProblem& problem, const JointProblem& joint) {
+  std::vector<std::vector<std::string>> order(1);
+  for (const std::string& id : problem.effects) {
+    const AeroelasticModel model = model_of(problem.rig, problem.runs, problem.circulation, {id});
+    const bool bends = std::any_of(joint.runs().begin(), joint.runs().end(), [&](const RunResidual& run) { return !model.system(run.conditions(), model.start_values(), run.channels()).feedback.empty(); });
+    if (bends) order.push_back({id});
+    else order.front().push_back(id);
+  }
+  if (order.front().empty()) order.erase(order.begin());
+  return order;
+}
+
 }  // namespace
+
+bool nonlinear(const Trial& trial) {
+  const JointProblem& joint = trial.arrival.joint;
+  for (std::size_t r = 0; r < joint.runs().size(); ++r)
+    if (joint.runs()[r].largest_arguments(joint.theta(r)).size() > 0) return true;
+  return false;
+}
 
 double Trial::reduced_chi2() const {
   double power = 0, count = 0;
@@ -206,6 +226,28 @@ bool fit_decays_first(Trial& trial, const Trial& base) {
   temper(joint);
   measure(trial);
   return helps;
+}
+
+bool follow_nonlinear(Trial& trial, const Trial& base, double least) {
+  if (!fit_decays_first(trial, base)) return false;
+  if (decays_decide(trial)) return true;
+  fit_fully(trial, 2);
+  if (trial.reduced_chi2() < least) fit_fully(trial, 6);
+  return true;
+}
+
+Arrival arrive_at_effects(const FitProblem& problem) {
+  Trial best = fit_baseline(problem);
+  for (const std::vector<std::string>& added : in_order(problem, best.arrival.joint)) {
+    std::vector<std::string> at_work = best.effects;
+    at_work.insert(at_work.end(), added.begin(), added.end());
+    Trial trial = prepare(problem, best, at_work);
+    if (nonlinear(trial)) follow_nonlinear(trial, best, best.reduced_chi2());
+    else fit_fully(trial, 2);
+    best = std::move(trial);
+  }
+  if (!leaves_nothing(best) && !decays_decide(best)) fit_from_first_guesses(problem, best);
+  return best.arrival;
 }
 
 void fit_from_first_guesses(const FitProblem& problem, Trial& trial) {

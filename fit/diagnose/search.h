@@ -21,6 +21,12 @@ struct Trial {
   double reduced_chi2() const;    ///< over all runs, in units of the noise
 };
 
+constexpr double explained = 1.15;  ///< residual power over noise power of a model that leaves nothing to name
+inline bool leaves_nothing(const Trial& trial) { return trial.reduced_chi2() < explained; }
+
+/// Whether nonlinear effects are at work in any of the runs.
+bool nonlinear(const Trial& trial);
+
 /// -2 ln likelihood of gauge and angle with each run's own variances, plus ln(samples) per variable, of `a` less that of `b` (G. Schwarz, Annals of Statistics 6 (1978) 461). Samples count
 /// by the colour of the better of the two.
 double bic_difference(const Trial& a, const Trial& b);
@@ -38,6 +44,13 @@ bool decays_decide(const Trial& trial);
 /// Of a prepared trial whose last effect is nonlinear: theta from the free decays alone (fit/decays_first.h), where there are any that
 /// `base` does not follow. False where the effect leaves more than half of what `base` leaves of them: the other runs are not worth the search.
 bool fit_decays_first(Trial& trial, const Trial& base);
+
+/// Fits a prepared trial whose last effect is nonlinear: by the free decays first, then everything, in full where that leaves less than `least`. False where the free decays speak against it.
+bool follow_nonlinear(Trial& trial, const Trial& base, double least);
+
+/// The fit of a problem with its effects at work, by the road that a diagnosis takes to them: the best fit with nothing missing, the linear effects together, the nonlinear
+/// ones one after the other, and all over again from first guesses where they leave more than the noise.
+Arrival arrive_at_effects(const FitProblem& problem);
 
 /// Fits a prepared trial with everything free, while the weights of the runs return to those of their noise, in so many rounds.
 void fit_fully(Trial& trial, int rounds);

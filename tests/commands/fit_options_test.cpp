@@ -118,5 +118,42 @@ TEST(FitOptions, ARunThatTheModelDoesNotExplainIsNamed) {
   EXPECT_FALSE(json::parse(read_text(directory.path("fit.json")))["warnings"].empty());
 }
 
+TEST(FitOptions, ARunThatTheModelDoesNotFollowIsNoAnswer) {
+  const TemporaryDirectory directory;
+  std::string text = "# unrig_run = 1\n# kind = \"pluck\"\n# density = \"1.2 kg/m^3\"\n# speed = \"0 m/s\"\ntime [s],gauge [N]\n";
+  for (int k = 0; k < 1000; ++k) {  // three tones alike: one mode can follow a third
+    const double t = 0.005 * k;
+    text += std::to_string(t) + "," + std::to_string(std::sin(2 * pi * 3 * t) + std::sin(2 * pi * 7 * t) + std::sin(2 * pi * 17 * t)) + "\n";
+  }
+  const Finished finished = fit_of(directory, directory.file("run.csv", text), {});
+  EXPECT_EQ(finished.status, 1);
+  EXPECT_THAT(finished.err, ::testing::AllOf(HasSubstr("no trustworthy answer: "), HasSubstr("run.csv: the model follows only")));
+  const json fit = json::parse(read_text(directory.path("fit.json")));
+  EXPECT_THAT(fit["no_answer"].get<std::string>(), HasSubstr("run.csv"));
+  EXPECT_EQ(fit["runs"][0]["explained"], false);
+  EXPECT_NEAR(fit["runs"][0]["followed"].get<double>(), 1. / 3, 0.02);
+  for (const json& p : fit["parameters"]) EXPECT_EQ(p["identified"], false) << p;
+}
+
+/// The first lines of a decay.
+std::string beginning(const TemporaryDirectory& directory, int samples) {
+  const std::string text = read_text(decay(directory));
+  std::size_t end = 0;
+  for (int line = 0; line < 5 + samples; ++line) end = text.find('\n', end) + 1;
+  return directory.file("run.csv", text.substr(0, end));
+}
+
+TEST(FitOptions, ARunOfFewSamplesIsRefused) {
+  const TemporaryDirectory directory;
+  const Finished three = fit_of(directory, beginning(directory, 3), {});
+  EXPECT_EQ(three.status, 2);
+  EXPECT_THAT(three.err, ::testing::AllOf(HasSubstr("run.csv: 3 samples for 3 unknowns of the run itself"), HasSubstr("Record for several periods")));
+  const Finished some = fit_of(directory, beginning(directory, 20), {});
+  EXPECT_EQ(some.status, 1);
+  EXPECT_THAT(some.err, ::testing::AllOf(HasSubstr("no trustworthy answer: 20 samples leave"), HasSubstr("Record for several periods")));
+  for (const json& p : json::parse(read_text(directory.path("fit.json")))["parameters"]) EXPECT_EQ(p["identified"], false) << p;
+  EXPECT_EQ(fit_of(directory, beginning(directory, 200), {}).status, 0) << "five periods";
+}
+
 }  // namespace
 }  // namespace unrig

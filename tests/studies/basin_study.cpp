@@ -5,6 +5,7 @@
 #include <CLI/CLI.hpp>
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <map>
 #include <mutex>
@@ -48,7 +49,8 @@ Outcome judge(const SimulatedCampaign& campaign, const FitResult& result) {
     good &= std::abs(p.value - campaign.of(p)) < far * p.std_error;
   }
   if (good && any) return Outcome::arrived;
-  return result.converged && result.warnings.empty() ? Outcome::silent : Outcome::said_so;
+  const bool explained = std::all_of(result.runs.begin(), result.runs.end(), [](const FittedRun& run) { return run.explained(); });
+  return result.no_answer.empty() && explained ? Outcome::silent : Outcome::said_so;
 }
 
 struct Count {

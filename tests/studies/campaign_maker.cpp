@@ -178,14 +178,9 @@ Rig rig_of(RigKind kind) {
 double SimulatedCampaign::of(const FittedParameter& p) const { return truth.at(p.run.empty() ? p.name : p.name + " " + p.run); }
 
 double combination_at(const std::function<double(const FittedParameter&)>& truth, const DeterminedCombination& c, const FitResult& result) {
-  const FittedParameter& own = result.parameters[c.unknowns[0]];
-  double value = truth(own);
-  for (std::size_t k = 0; k < c.slope.size(); ++k) {
-    const FittedParameter& held = result.parameters[c.unknowns[k + 1]];
-    if (c.product) value *= std::pow(truth(held), -std::round(2 * c.slope[k] * held.value / own.value) / 2);
-    else value -= c.slope[k] * truth(held);
-  }
-  return value;
+  std::vector<double> values;
+  for (const std::size_t unknown : c.unknowns) values.push_back(truth(result.parameters[unknown]));
+  return c.at(values);
 }
 
 SimulatedCampaign simulate_campaign(const CampaignRecipe& recipe, unsigned seed) {
