@@ -207,12 +207,12 @@ void judge_answer(FitResult& result) {
   const auto known = [](const FittedParameter& p) { return p.identified; };
   const auto lost = std::find_if(result.runs.begin(), result.runs.end(), [](const FittedRun& run) { return run.followed < half && !run.explained(); });
   std::string advice;
-  if (!result.converged) {
-    result.no_answer = "the fit did not converge: " + result.message;
-    advice = "The fit did not converge. ";
-  } else if (freedom < enough) {
+  if (freedom < enough) {
     result.no_answer = fmt::format("{} samples leave {} degrees of freedom beside {} unknowns, too few to tell noise from signal. Record for several periods of the lowest mode.", result.observations, freedom, result.variables);
     advice = "These runs are too short. ";
+  } else if (!result.converged) {
+    result.no_answer = "the fit did not converge: " + result.message;
+    advice = "The fit did not converge. ";
   } else if (lost != result.runs.end()) {
     result.no_answer = fmt::format("{}: the model follows only {:.0f} % of the variance of this run. The search ended in a wrong minimum, or this is not a run of this rig. Check rig file and run, give start values (--start), or "
                                    "leave the run out.", lost->file, 100 * std::max(0.0, lost->followed));
@@ -220,7 +220,10 @@ void judge_answer(FitResult& result) {
   } else if (std::none_of(result.parameters.begin(), result.parameters.end(), known) && result.determined.empty()) {
     result.no_answer = "these runs determine no parameter";
     for (const FittedParameter& p : result.parameters)
-      if (!p.advice.empty()) { result.no_answer += ". " + p.name + ": " + p.advice; break; }
+      if (!p.advice.empty()) {
+        result.no_answer += ". " + p.name + ": " + p.advice;
+        break;
+      }
     return;
   }
   if (result.no_answer.empty()) return;

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 #include <numeric>
+#include <set>
 
 #include "core/in_parallel.h"
 
@@ -94,9 +95,10 @@ JointProblem::Summary JointProblem::solve(const SolveOptions& options) {
   std::vector<Index> free;
   for (const Unknown& u : unknowns_)
     if (!u.held) free.push_back(u.parameter);
+  const bool some_held = std::set<Index>(free.begin(), free.end()).size() < model_->parameters().size();
   constexpr double finest = 3e-3;
   for (RunResidual& run : runs_) {
-    run.differentiate_only(free);
+    if (some_held) run.differentiate_only(free);
     run.search_linear_to(options.prior ? 0.1 : std::max(finest, 0.1 * options.precision));
   }
   LeastSquaresOptions search;
@@ -109,7 +111,7 @@ JointProblem::Summary JointProblem::solve(const SolveOptions& options) {
   search.evaluations = options.most_evaluations;
   const LeastSquaresResult result = solve_least_squares(problem, search);
   for (RunResidual& run : runs_) {
-    run.differentiate_only({});
+    if (some_held) run.differentiate_only({});
     run.search_linear_to(finest);
   }
   for (std::size_t i = 0; i < unknowns_.size(); ++i) unknowns_[i].value = result.point.values[static_cast<Index>(i)];

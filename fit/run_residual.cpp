@@ -126,6 +126,7 @@ Index RunResidual::degrees_of_freedom() const { return observations() - unknowns
 /// Rows [c | angle] of the angle channel. Where the angle is constant all rows are alike and are one row with their common weight, besides a
 /// row for their scatter.
 void RunResidual::prepare_angle_rows() {
+  forget_solutions();
   angle_rows_.clear();
   if (motion_prior_.rows() > 0) angle_rows_.push_back(motion_prior_);
   if (angle_offset_ < 0) return;
@@ -240,7 +241,7 @@ Index RunResidual::reject_spikes(const VectorXd& theta, double limit) {
   for (Index k : spikes) angle_weight_[k] = 0;
   const auto rejected = static_cast<Index>(spikes.size());
   spikes_ += rejected;
-  prepare_angle_rows();
+  if (rejected > 0) prepare_angle_rows();
   return rejected;
 }
 

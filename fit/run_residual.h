@@ -91,7 +91,10 @@ class RunResidual {
   Eigen::VectorXd largest_arguments(const Eigen::VectorXd& theta) const;
 
   /// Parameters with respect to which `evaluate` differentiates; the other columns of the Jacobian are zero, and cost nothing. Empty: all.
-  void differentiate_only(std::vector<Eigen::Index> parameters) { differentiated_ = std::move(parameters); }
+  void differentiate_only(std::vector<Eigen::Index> parameters) {
+    differentiated_ = std::move(parameters);
+    last_evaluation_ = {};
+  }
 
   /// Sample by sample and in units of the noise: what is left, and how the prediction moves with theta while c follows. Left-out samples are 0.
   struct Sensitivity {
@@ -176,6 +179,10 @@ class RunResidual {
  private:
   std::shared_ptr<Linearised> linearise(const Eigen::VectorXd& theta) const;
   void weights_changed();
+  void forget_solutions() {
+    last_solution_ = {};
+    last_evaluation_ = {};
+  }
   void stack_rows(Linearised& lin) const;
   Eigen::VectorXd whole_jerk(const Eigen::VectorXd& linear) const;
   bool stack_nonlinear_rows(Linearised& lin, const Eigen::VectorXd& theta, const Eigen::VectorXd& linear) const;
@@ -230,6 +237,10 @@ class RunResidual {
   mutable std::map<std::pair<Eigen::Index, Eigen::Index>, rest_rows::SmoothReadings> smooth_readings_;  ///< by channel and first sample, where they were asked for
   Eigen::Index spikes_ = 0;
   Eigen::Index last_sample_ = 0;
+
+  /// Of a linear model: the last theta that was asked for, whose answer does not depend on what was asked before; and the derivatives there.
+  mutable Solution last_solution_;
+  mutable Evaluation last_evaluation_;
 
   /// From where the search for c starts in a nonlinear run: c of the last solution, and that of the last one whose derivatives are known.
   mutable Eigen::VectorXd last_linear_;

@@ -235,12 +235,15 @@ void RunResidual::stack_rows(Linearised& lin) const {
 }
 
 RunResidual::Solution RunResidual::solve(const VectorXd& theta) const {
+  if (last_solution_.model && last_solution_.theta == theta) return last_solution_;
   const std::shared_ptr<Linearised> lin = linearise(theta);
-  if (lin->system.feedback.empty())
-    stack_rows(*lin);
-  else
+  if (!lin->system.feedback.empty()) {
     solve_nonlinear(*lin, theta);
-  return {theta, lin->chi2, lin->linear, lin};
+    return {theta, lin->chi2, lin->linear, lin};
+  }
+  stack_rows(*lin);
+  last_evaluation_ = {};
+  return last_solution_ = {theta, lin->chi2, lin->linear, lin};
 }
 
 /// The model's system, corners of its laws rounded where they have any.
@@ -319,6 +322,8 @@ void RunResidual::follow_partials(const VectorXd& theta, const VectorXd& linear,
 }
 
 RunResidual::Evaluation RunResidual::differentiate(const Solution& solution) const {
+  const bool is_last = solution.model == last_solution_.model;
+  if (is_last && last_evaluation_.residual.size() > 0) return last_evaluation_;
   const Linearised& lin = *solution.model;
   const auto parameters = static_cast<Index>(model_->parameters().size());
   std::vector<run_rows::Rotated> rotated_blocks(lin.blocks.size());
@@ -363,6 +368,7 @@ RunResidual::Evaluation RunResidual::differentiate(const Solution& solution) con
   e.residual.head(triangle.rows()) = triangle.col(parameters);
   e.chi2 = e.residual.squaredNorm();
   if (!solution.model->system.feedback.empty()) guide_ = {solution.theta, e.linear, e.linear_slope, solution.chi2};
+  if (is_last) last_evaluation_ = e;
   return e;
 }
 

@@ -246,8 +246,14 @@ Arrival arrive_at_effects(const FitProblem& problem) {
     else fit_fully(trial, 2);
     best = std::move(trial);
   }
-  if (!leaves_nothing(best) && !decays_decide(best)) fit_from_first_guesses(problem, best);
-  return best.arrival;
+  if (leaves_nothing(best) || decays_decide(best)) return best.arrival;
+  if (nonlinear(best)) {
+    fit_from_first_guesses(problem, best);
+    return best.arrival;
+  }
+  Trial anew{best.effects, arrive_with_effects(problem, best.arrival)};
+  measure(anew);
+  return bic_difference(anew, best) < 0 ? anew.arrival : best.arrival;
 }
 
 void fit_from_first_guesses(const FitProblem& problem, Trial& trial) {
