@@ -10,6 +10,7 @@
 #include "core/in_parallel.h"
 #include "fit/diagnose/search.h"
 #include "fit/diagnose/trial_campaign.h"
+#include "fit/fit.h"
 #include "tests/support/sample_data.h"
 
 namespace unrig {
@@ -91,6 +92,22 @@ TEST(DecaysFirst, FrictionThatStopsTheRigIsFoundFromARigThatIsFarOff) {
   EXPECT_LT(fit_decays(trial.arrival.joint, "coulomb-friction"), 1.15) << "what counts as explained";
   // 0.03 N of noise on some ten Newton over 2500 samples tell the force better than to a hundredth.
   EXPECT_NEAR(unknowns_of(trial.arrival.joint, "coulomb-friction").front()->value / hidden.parameters.front(), 1, 0.01);
+}
+
+/// `unrig fit --effect` from the rig file: a spring that stiffens so much that the fit without it leaves 80 times the noise of the decays and more.
+TEST(DecaysFirst, AFitWithAStrongSpringNamedArrives) {
+  constexpr unsigned seed = 5, trial = 19;
+  const Hidden hidden = hide("cubic-stiffness", seed, trial);
+  ASSERT_GT(hidden.baseline.reduced_chi2(), 1000);
+  FitProblem problem = *hidden.problem;
+  problem.effects = {"cubic-stiffness"};
+  const FitResult result = fit(problem);
+  EXPECT_EQ(result.no_answer, "");
+  for (const FittedRun& run : result.runs) EXPECT_TRUE(run.explained()) << run.file << " " << run.reduced_chi2();
+  for (const FittedParameter& p : result.parameters) {
+    if (p.name != "cubic-stiffness.coefficient") continue;
+    EXPECT_NEAR(p.value / hidden.parameters.front(), 1, 0.01) << "forces that run straight from sample to sample are off by (3 omega dt)^2 / 12 = 0.7 % at the third harmonic";
+  }
 }
 
 }  // namespace

@@ -48,7 +48,7 @@ int study(int argc, char** argv) {
   int campaigns = 8, threads = 1;
   unsigned seed = 1;
   double noise = 0.03, least = 0;
-  std::vector<std::string> ids{"coulomb-friction", "quadratic-drag", "cubic-stiffness", "freeplay"};
+  std::vector<std::string> ids{"coulomb-friction", "quadratic-drag", "cubic-stiffness"};
   bool verbose = false;
   app.add_option("--effects", ids, "which")->capture_default_str()->delimiter(',');
   app.add_option("--campaigns", campaigns, "of each effect")->capture_default_str();
