@@ -170,7 +170,8 @@ double bic_difference(const Trial& a, const Trial& b) {
   double difference = 0, total = 0;
   for (std::size_t r = 0; r < a.variance.size(); ++r) {
     difference += better.samples[r] * std::log(a.variance[r] / b.variance[r]);
-    if (a.angle_samples[r] > 0) difference += b.angle_samples[r] * std::log(a.angle_variance[r] / b.angle_variance[r]);
+    // Of a run that is not explained the gauge is weighted down, and does not bend the motion.
+    if (a.angle_samples[r] > 0 && std::max(a.variance[r], b.variance[r]) < explained) difference += b.angle_samples[r] * std::log(a.angle_variance[r] / b.angle_variance[r]);
     total += better.samples[r];
   }
   return difference + (a.variables - b.variables) * std::log(total);

@@ -27,7 +27,7 @@ inline bool leaves_nothing(const Trial& trial) { return trial.reduced_chi2() < e
 /// Whether nonlinear effects are at work in any of the runs.
 bool nonlinear(const Trial& trial);
 
-/// -2 ln likelihood of gauge and angle with each run's own variances, plus ln(samples) per variable, of `a` less that of `b` (G. Schwarz, Annals of Statistics 6 (1978) 461). Samples count
+/// -2 ln likelihood of the gauge with each run's own variance, and of the angle where both explain the run, plus ln(samples) per variable, of `a` less that of `b` (G. Schwarz, Annals of Statistics 6 (1978) 461). Samples count
 /// by the colour of the better of the two.
 double bic_difference(const Trial& a, const Trial& b);
 
