@@ -74,16 +74,14 @@ std::vector<MotionBasis::Window> generous_windows(const Run& run) {
 Search estimate(RunResidual& residual, const Prior& prior, const VectorXd& start, MatrixXd& rough) {
   constexpr double roughly = 1, well = 1e-3;  // of a chi-square whose own scatter is some tens
   residual.differentiate_only(prior.free);
-  RunResidual followed = residual;
-  Search first = minimise(residual, prior, start, roughly, false);
-  if (followed.find_linear(start)) {  // dry friction that lets go at another time is another minimum: once more from a motion that was found along the record
-    Search other = minimise(followed, prior, start, roughly, false);
-    if (other.solution.chi2 < first.solution.chi2) {
-      residual = std::move(followed);
-      first = std::move(other);
+  VectorXd theta = start;
+  if (residual.find_linear(theta))  // dry friction that lets go at another time is another minimum: the motion as the angle says, before the gauge has its full say
+    for (const double softer : {30.0, 10.0, 3.0}) {
+      residual.temper(softer);
+      theta = minimise(residual, prior, theta, roughly, false).solution.theta;
     }
-  }
-  const VectorXd theta = first.solution.theta;
+  residual.temper(1);
+  theta = minimise(residual, prior, theta, roughly, false).solution.theta;
   residual.settle_noise(theta);
   residual.reject_spikes(theta);
   rough = motion_prior(residual, theta);
