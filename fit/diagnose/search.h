@@ -27,8 +27,8 @@ inline bool leaves_nothing(const Trial& trial) { return trial.reduced_chi2() < e
 /// Whether nonlinear effects are at work in any of the runs.
 bool nonlinear(const Trial& trial);
 
-/// -2 ln likelihood of the gauge with each run's own variance, and of the angle where both explain the run, plus ln(samples) per variable, of `a` less that of `b` (G. Schwarz, Annals of Statistics 6 (1978) 461). Samples count
-/// by the colour of the better of the two.
+/// -2 ln likelihood of the gauge with each run's own variance, and of the angle where both explain the run, plus ln(samples) per variable, of `a` less that of `b`
+/// (G. Schwarz, Annals of Statistics 6 (1978) 461). Samples of the gauge count by the colour of the better of the two.
 double bic_difference(const Trial& a, const Trial& b);
 
 /// The best fit with nothing missing.
@@ -42,7 +42,7 @@ Trial prepare(const FitProblem& problem, const Trial& base, const std::vector<st
 bool decays_decide(const Trial& trial);
 
 /// Of a prepared trial whose last effect is nonlinear: theta from the free decays alone (fit/decays_first.h), where there are any that
-/// `base` does not follow. False where the effect leaves more than half of what `base` leaves of them: the other runs are not worth the search.
+/// `base` does not follow. False where the effect leaves more than half of the excess that `base` leaves of them: the other runs are not worth the search.
 bool fit_decays_first(Trial& trial, const Trial& base);
 
 /// Fits a prepared trial whose last effect is nonlinear: by the free decays first, then everything, in full where that leaves less than `least`. False where the free decays speak against it.

@@ -168,6 +168,9 @@ def main():
     for method in methods:
         cells = [f"{100 * np.sqrt(np.mean(squares[method][c])):.3g} %" for c in arguments.names]
         print(f"| {method} | " + " | ".join(cells) + " |")
+    print(f"\n`unrig correct`, run by run ({', '.join(STEPS)}):")
+    for name in arguments.names:
+        print(f"  {name}: " + ", ".join(f"{100 * np.sqrt(e):.2f} %" for e in squares[methods[-1]][name]))
 
 
 if __name__ == "__main__":

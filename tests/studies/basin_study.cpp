@@ -13,6 +13,7 @@
 
 #include "tests/studies/campaign_maker.h"
 #include "tests/studies/crew.h"
+#include "tests/studies/outcome.h"
 
 namespace unrig::studies {
 namespace {
@@ -38,8 +39,6 @@ void falsify(SimulatedCampaign& campaign, double stiffness, double damping) {
   }
 }
 
-enum class Outcome { arrived, said_so, silent };
-
 Outcome judge(const SimulatedCampaign& campaign, const FitResult& result) {
   constexpr double far = 5;  // standard errors, of a dozen parameters: chance does not go there
   bool good = result.converged, any = false;
@@ -49,13 +48,8 @@ Outcome judge(const SimulatedCampaign& campaign, const FitResult& result) {
     good &= std::abs(p.value - campaign.of(p)) < far * p.std_error;
   }
   if (good && any) return Outcome::arrived;
-  const bool explained = std::all_of(result.runs.begin(), result.runs.end(), [](const FittedRun& run) { return run.explained(); });
-  return result.no_answer.empty() && explained ? Outcome::silent : Outcome::said_so;
+  return raises_no_doubt(result) ? Outcome::silent : Outcome::said_so;
 }
-
-struct Count {
-  int tried = 0, arrived = 0, silent = 0;
-};
 
 int study(int argc, char** argv) {
   CLI::App app{"Counts how often a fit arrives from a rig file that is wrong.", "basin_study"};
@@ -77,8 +71,8 @@ int study(int argc, char** argv) {
   std::vector<double> stiffness{0.4, 0.5, 0.63, 0.8, 1, 1.25, 1.6, 2, 2.5}, damping{0.1, 0.3, 1, 3, 10};
   if (short_form) stiffness = {0.5, 2}, damping = {0.1, 10};
 
-  std::map<std::pair<double, double>, Count> counts;
-  std::map<std::string, Count> by_rig;
+  std::map<std::pair<double, double>, OutcomeCount> counts;
+  std::map<std::string, OutcomeCount> by_rig;
   std::mutex counting;
   const int cells = static_cast<int>(stiffness.size() * damping.size() * recipes.size());
   each(cells * campaigns, threads, [&](int i) {
@@ -90,14 +84,10 @@ int study(int argc, char** argv) {
     const FitResult result = fit(campaign.problem);
     const Outcome outcome = judge(campaign, result);
     const std::lock_guard guard(counting);
-    for (Count* c : {&counts[{k, d}], &by_rig[recipe.name()]}) {
-      ++c->tried;
-      c->arrived += outcome == Outcome::arrived ? 1 : 0;
-      c->silent += outcome == Outcome::silent ? 1 : 0;
-    }
+    for (OutcomeCount* c : {&counts[{k, d}], &by_rig[recipe.name()]}) c->add(outcome);
     if (verbose && outcome != Outcome::arrived)
       fmt::print("  {}, seed {}, stiffness x {}, damping x {}: {}, reduced chi-square {:.3g}\n", recipe.name(), seed + static_cast<unsigned>(i / cells), k, d,
-                 outcome == Outcome::silent ? "WRONG IN SILENCE" : "did not arrive", result.reduced_chi2());
+                 said(outcome), result.reduced_chi2());
   });
 
   fmt::print("\nArrived, of {} in each cell; the rig file's stiffness and damping over the true ones:\n\n| stiffness |", campaigns * static_cast<int>(recipes.size()));
@@ -108,7 +98,7 @@ int study(int argc, char** argv) {
   for (const double k : stiffness) {
     fmt::print("\n| x {} |", k);
     for (const double d : damping) {
-      const Count& c = counts[{k, d}];
+      const OutcomeCount& c = counts[{k, d}];
       fmt::print(" {:.0f} % |", 100.0 * c.arrived / c.tried);
       silent += c.silent;
       if (k < 0.45 || k > 2.2) continue;

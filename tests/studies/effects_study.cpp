@@ -15,33 +15,28 @@
 #include "fit/diagnose/trial_campaign.h"
 #include "fit/fit.h"
 #include "tests/studies/crew.h"
+#include "tests/studies/outcome.h"
 #include "tests/support/sample_data.h"
 
 namespace unrig::studies {
 namespace {
 
-enum class Outcome { arrived, said_so, silent };
-
 /// Every parameter of the effect that is called identified within five standard errors of the truth, every run explained.
 Outcome judge(const TrialCampaign& campaign, const FitResult& result, double& worst) {
   constexpr double far = 5;
-  bool good = result.converged;
+  bool good = result.converged, any = false;
   worst = 0;
   const auto& parameters = effect(campaign.hidden.front()).parameters;
   for (std::size_t k = 0; k < parameters.size(); ++k)
     for (const FittedParameter& p : result.parameters)
       if (p.name == campaign.hidden.front() + "." + parameters[k].name && p.identified) {
+        any = true;
         worst = std::max(worst, std::abs(p.value - campaign.parameters[k]) / p.std_error);
         good &= std::abs(p.value - campaign.parameters[k]) < far * p.std_error;
       }
-  const bool quiet = result.no_answer.empty() && std::all_of(result.runs.begin(), result.runs.end(), [](const FittedRun& run) { return run.explained(); });
-  if (quiet) return good ? Outcome::arrived : Outcome::silent;
-  return Outcome::said_so;
+  if (!any || !raises_no_doubt(result)) return Outcome::said_so;
+  return good ? Outcome::arrived : Outcome::silent;
 }
-
-struct Count {
-  int tried = 0, arrived = 0, silent = 0;
-};
 
 int study(int argc, char** argv) {
   CLI::App app{"Counts how often a fit with a nonlinear effect named arrives.", "effects_study"};
@@ -59,7 +54,7 @@ int study(int argc, char** argv) {
   app.add_flag("--verbose", verbose, "print every fit");
   CLI11_PARSE(app, argc, argv);
 
-  std::map<std::string, std::map<int, Count>> counts;  // by effect and size: 1 for up to the noise, 2 for up to 10 times the noise, ...
+  std::map<std::string, std::map<int, OutcomeCount>> counts;  // by effect and size: 1 for up to the noise, 2 for up to 10 times the noise, ...
   std::mutex counting;
   const Rig rig = read_rig(test::null_campaign("rig.toml"));
   const int jobs = campaigns * static_cast<int>(ids.size());
@@ -78,13 +73,9 @@ int study(int argc, char** argv) {
     double worst = 0;
     const Outcome outcome = judge(campaign, result, worst);
     const std::lock_guard guard(counting);
-    Count& c = counts[id][std::clamp(static_cast<int>(std::ceil(std::log10(campaign.size))), -1, 3) + 1];
-    ++c.tried;
-    c.arrived += outcome == Outcome::arrived ? 1 : 0;
-    c.silent += outcome == Outcome::silent ? 1 : 0;
+    counts[id][std::clamp(static_cast<int>(std::ceil(std::log10(campaign.size))), -1, 3) + 1].add(outcome);
     if (!verbose) return;
-    static const char* const said[] = {"arrived", "did not arrive", "WRONG IN SILENCE"};
-    fmt::print("  {}, trial {}, {:.3g} times the noise: {}, off by {:.1f} standard errors, reduced chi-square", id, trial, campaign.size, said[static_cast<int>(outcome)], worst);
+    fmt::print("  {}, trial {}, {:.3g} times the noise: {}, off by {:.1f} standard errors, reduced chi-square", id, trial, campaign.size, said(outcome), worst);
     for (const FittedRun& run : result.runs) fmt::print(" {:.3g}", run.reduced_chi2());
     fmt::print(", {:.1f} s{}\n", result.seconds, result.converged ? "" : ", not converged: " + result.message);
     if (!result.no_answer.empty()) fmt::print("    {}\n", result.no_answer);
