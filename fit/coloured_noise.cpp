@@ -9,22 +9,36 @@ namespace unrig {
 namespace {
 
 using Eigen::Index;
+using Eigen::MatrixXcd;
 using Eigen::MatrixXd;
 using Eigen::VectorXcd;
 using Eigen::VectorXd;
 
-/// Power of the residual per line, averaged over `half` lines on either side; mean 1 where the residual is what it should be.
-VectorXd smoothed_power(const VectorXcd& lines, double samples, Index half) {
+/// Mean over `half` lines on either side, as far as there are any.
+VectorXd running_mean(const VectorXd& lines, Index half) {
   const Index n = lines.size();
-  const VectorXd power = lines.cwiseAbs2() / samples;
   VectorXd sum = VectorXd::Zero(n + 1);
-  for (Index k = 0; k < n; ++k) sum[k + 1] = sum[k] + power[k];
-  VectorXd smooth(n);
+  for (Index k = 0; k < n; ++k) sum[k + 1] = sum[k] + lines[k];
+  VectorXd mean(n);
   for (Index k = 0; k < n; ++k) {
     const Index first = std::max<Index>(0, k - half), last = std::min(n, k + half + 1);
-    smooth[k] = (sum[last] - sum[first]) / static_cast<double>(last - first);
+    mean[k] = (sum[last] - sum[first]) / static_cast<double>(last - first);
   }
-  return smooth;
+  return mean;
+}
+
+/// Power of the residual per line over what the fit leaves of it (`left`, 0 to 1); mean 1 where the residual is what it should be.
+VectorXd smoothed_power(const VectorXcd& lines, const VectorXd& left, double samples, Index half) {
+  return running_mean(lines.cwiseAbs2() / samples, half).cwiseQuotient(running_mean(left, half));
+}
+
+/// 1 - h of each line: nothing of the mean, which the offset takes, and at least a tenth of the others, because where the fit takes nearly all of the
+/// noise, what it leaves tells nothing.
+VectorXd left_of_lines(const MatrixXcd& slopes, const MatrixXd& inverse) {
+  const VectorXd leverage = slopes.conjugate().cwiseProduct(slopes * inverse).rowwise().sum().real();
+  VectorXd left = (1 - leverage.array()).cwiseMax(0.1);
+  left[0] = 0;
+  return left;
 }
 
 /// Power of an autoregression fitted to the residual (Burg's recursion; order by Akaike's criterion), on the lines of its transform; scaled as smoothed_power is.
@@ -57,33 +71,41 @@ double kolmogorov(double x) {
 
 }  // namespace
 
-MatrixXd coloured_information(const RunResidual::Sensitivity& sensitivity) {
+ColouredCovariance coloured_covariance(const RunResidual::Sensitivity& sensitivity, const MatrixXd& influence, const MatrixXd& inverse) {
   constexpr Index half = 3;  // seven lines: the spectrum to 38 %, standard errors to 19 %, and lines as narrow as a resonance are kept
-  MatrixXd information;
+  ColouredCovariance sum{MatrixXd::Zero(influence.rows(), influence.rows()), VectorXd::Zero(influence.rows())};
   for (const auto& channel : sensitivity.channels) {
-    const Index parameters = channel.slope.cols(), samples = channel.residual.size();
-    if (information.size() == 0) information = MatrixXd::Zero(parameters, parameters);
     const auto counted = static_cast<double>((channel.residual.array() != 0).count());
-    if (counted == 0) continue;
-    VectorXd power = smoothed_power(fourier(channel.residual), counted, half);
-    power = power.cwiseMax(autoregressive_power(channel.residual, counted, power.size()));
-    std::vector<Index> active;
-    std::vector<VectorXcd> lines;
-    for (Index j = 0; j < parameters; ++j) {
-      if (channel.slope.col(j).squaredNorm() == 0) continue;
-      active.push_back(j);
-      lines.push_back(fourier(channel.slope.col(j)));
+    if (counted == 0 || channel.slope.squaredNorm() == 0) continue;
+    const auto samples = static_cast<double>(channel.residual.size());
+    MatrixXcd slopes(channel.residual.size() / 2 + 1, channel.slope.cols());
+    for (Index j = 0; j < slopes.cols(); ++j) slopes.col(j) = fourier(channel.slope.col(j));
+    const VectorXd power = smoothed_power(fourier(channel.residual), left_of_lines(slopes, inverse / samples), counted, half)
+                               .cwiseMax(autoregressive_power(channel.residual, counted, slopes.rows()));
+    VectorXd sides = VectorXd::Constant(power.size(), 2 / samples);  // every line but these two stands for its mirror image too
+    sides[0] = 1 / samples;
+    if (channel.residual.size() % 2 == 0) sides[sides.size() - 1] = 1 / samples;
+    const VectorXd weight = power.cwiseProduct(sides);
+    const MatrixXcd through = slopes * influence.transpose();
+    sum.covariance += (through.adjoint() * weight.asDiagonal() * through).real();
+    for (Index a = 0; a < through.cols(); ++a) {
+      // What the power of each single line adds to the variance, by way of all the averages that it is in.
+      const VectorXd gain = running_mean(through.col(a).cwiseAbs2().cwiseProduct(sides), half);
+      sum.spread[a] += gain.cwiseProduct(power).squaredNorm() / 2;
     }
-    for (std::size_t a = 0; a < active.size(); ++a)
-      for (std::size_t b = 0; b <= a; ++b) {
-        const VectorXd cross = (lines[a].conjugate().cwiseProduct(lines[b])).real().cwiseProduct(power);
-        double both_sides = 2 * cross.sum() - cross[0];
-        if (samples % 2 == 0) both_sides -= cross[cross.size() - 1];
-        information(active[a], active[b]) += both_sides / static_cast<double>(samples);
-        if (a != b) information(active[b], active[a]) = information(active[a], active[b]);
-      }
   }
-  return information;
+  return sum;
+}
+
+void ColouredCovariance::add(const ColouredCovariance& run) {
+  if (covariance.size() == 0) *this = run;
+  else covariance += run.covariance, spread += run.spread;
+}
+
+MatrixXd ColouredCovariance::with_its_own_error() const {
+  const VectorXd freedom = covariance.diagonal().cwiseAbs2().cwiseQuotient(spread.cwiseMax(1e-300)).cwiseMax(4.0);
+  const VectorXd factor = freedom.cwiseQuotient((freedom.array() - 2).matrix()).cwiseSqrt();
+  return factor.asDiagonal() * covariance * factor.asDiagonal();
 }
 
 double power_at_zero(const VectorXd& residual) {

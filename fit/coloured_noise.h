@@ -13,14 +13,29 @@ namespace unrig {
 /// Residuals of real recordings are coloured, and it then is several times too small (Morelli and Klein, J. Aircraft 34 (1997) 775). With
 /// the residual's own spectrum S(f), for each channel by itself,
 ///
-///   cov(theta) = H^-1 (J^T Sigma J) H^-1,   J^T Sigma J = (1/n) sum_f S(f) conj(J^(f)) J^(f)^T
+///   cov(theta) = H^-1 (J^T Sigma J) H^-1 = (1/n) sum_f S(f) conj(G(f)) G(f)^T,   G = H^-1 J^(f)
 ///
 /// S is the periodogram of the residual, averaged over seven neighbouring lines, 1 for white noise of the assumed level; or the spectrum of an
 /// autoregression fitted to the residual, where that is more. The first sees lines as narrow as a resonance, but just there the fit has taken part
-/// of the noise into its parameters; the second makes up for that. Coverage: tests/studies/COVERAGE.md.
+/// of the noise into its parameters: of the noise's power in line f it leaves 1 - h(f), with the leverage h(f) = conj(J^(f))^T H^-1 J^(f) / n, and
+/// seven lines' power is divided by what the fit leaves of them (as HC2 of MacKinnon and White, J. Econometrics 29 (1985) 305, does by samples).
+///
+/// A variance that a few lines tell is itself uncertain. It counts as one of chi-square's with nu = 2 E^2 / V degrees of freedom (Satterthwaite,
+/// Biometrics Bull. 2 (1946) 110; E its value, V its variance when each line's power scatters by itself), and errors in units of its root have the
+/// variance nu / (nu - 2) of Student's t, by which it is multiplied. Coverage: tests/studies/COVERAGE.md.
 
-/// J^T Sigma J of one run over all model parameters (P x P).
-Eigen::MatrixXd coloured_information(const RunResidual::Sensitivity& sensitivity);
+/// What the noise of runs does to the parameters.
+struct ColouredCovariance {
+  Eigen::MatrixXd covariance;  ///< over the rows of `influence`
+  Eigen::VectorXd spread;      ///< V / 2 of its diagonal
+
+  void add(const ColouredCovariance& run);
+  /// With every variance multiplied by its nu / (nu - 2); nu counts as 4 at least, below which t has hardly a variance.
+  Eigen::MatrixXd with_its_own_error() const;
+};
+
+/// Of one run; `influence` holds rows of H^-1 over all parameters of the model, zero for those that are held or of another run.
+ColouredCovariance coloured_covariance(const RunResidual::Sensitivity& sensitivity, const Eigen::MatrixXd& influence, const Eigen::MatrixXd& inverse);
 
 /// S at frequency zero, where a constant offset sees the noise: likewise, over the lowest seven lines without the mean itself, which the offset took.
 double power_at_zero(const Eigen::VectorXd& residual);

@@ -36,20 +36,22 @@ ParameterUncertainty estimate_uncertainty(const JointProblem& joint) {
 
   constexpr double significant = 0.01;
   double freedom = -static_cast<double>(count);
-  MatrixXd middle = MatrixXd::Zero(count, count);
+  ColouredCovariance coloured;
   for (std::size_t r = 0; r < joint.runs().size(); ++r) {
     const RunResidual::Sensitivity sensitivity = joint.runs()[r].sensitivity(joint.theta(r));
     u.whiteness.push_back(whiteness(sensitivity));
     u.coloured |= u.whiteness.back() * static_cast<double>(joint.runs().size()) < significant;
     freedom += static_cast<double>(joint.runs()[r].degrees_of_freedom());
-    const MatrixXd run = coloured_information(sensitivity);
-    const auto acts = [&](const Unknown& x) { return x.run < 0 || x.run == static_cast<int>(r); };
+    const Index parameters = joint.theta(r).size();
+    MatrixXd influence = MatrixXd::Zero(count, parameters), own = MatrixXd::Zero(parameters, parameters);
+    for (Index b = 0; b < count; ++b)
+      if (unknown(b).run < 0 || unknown(b).run == static_cast<int>(r)) influence.col(unknown(b).parameter) += inverse.col(b);
     for (Index a = 0; a < count; ++a)
-      for (Index b = 0; b < count; ++b)
-        if (acts(unknown(a)) && acts(unknown(b))) middle(a, b) += run(unknown(a).parameter, unknown(b).parameter);
+      if (unknown(a).run < 0 || unknown(a).run == static_cast<int>(r)) own.row(unknown(a).parameter) += influence.row(a);
+    coloured.add(coloured_covariance(sensitivity, influence, own));
   }
   u.white_covariance = inverse * std::max(1.0, lin.chi2() / freedom);
-  u.coloured_covariance = inverse * middle * inverse;
+  u.coloured_covariance = coloured.with_its_own_error();
   return u;
 }
 

@@ -10,7 +10,7 @@ namespace unrig {
 struct ParameterUncertainty {
   std::vector<Eigen::Index> free;        ///< which unknowns, in the order of the matrices
   Eigen::MatrixXd white_covariance;      ///< H^-1, times the reduced chi-square where that exceeds one
-  Eigen::MatrixXd coloured_covariance;   ///< H^-1 (J^T Sigma J) H^-1 with the residuals' own spectra (fit/coloured_noise.h)
+  Eigen::MatrixXd coloured_covariance;   ///< H^-1 (J^T Sigma J) H^-1 with the residuals' own spectra, and with what these leave open (fit/coloured_noise.h)
   bool coloured = false;                 ///< some run's residual is not white: its probability, times the number of runs, is below 1 %
   std::vector<double> whiteness;         ///< per run
 
