@@ -195,8 +195,9 @@ class Decays {
     for (std::size_t d = 0; d < decays_.size(); ++d) add(decays_[d], linear[d]);
   }
 
-  /// Over the whole records at once, or over records that grow from a few samples.
-  void search(bool growing) {
+  /// Over the whole records at once (`growth` 0), or over records that grow by this factor from a few samples. False where it gave up: `lost` times the noise's
+  /// power, over a part of the records.
+  bool search(double growth, double lost = INFINITY) {
     Index longest = 0, first = 0;
     for (const RunResidual& run : runs_) {
       longest = std::max(longest, run.run().samples());
@@ -207,11 +208,12 @@ class Decays {
     options.precision = 0.5;
     options.relative_change = 1e-3;
     options.iterations = 8;
-    constexpr double growth = 1.5;
-    for (samples_ = first; growing && samples_ < longest; samples_ = static_cast<Index>(growth * static_cast<double>(samples_))) search_with(options, true);
+    for (samples_ = first; growth > 0 && samples_ < longest; samples_ = static_cast<Index>(growth * static_cast<double>(samples_)))
+      if (search_with(options, true) > lost * static_cast<double>(samples_ * static_cast<Index>(runs_.size()))) return false;
     samples_ = longest;
     options.iterations = 30;
     search_with(options, false);
+    return true;
   }
 
   /// chi-square over the degrees of freedom of the whole records; theta and c go back to the joint problem.
@@ -229,12 +231,13 @@ class Decays {
   }
 
  private:
-  /// `prior`: theta stays near where it is, while a few samples determine little of it.
-  void search_with(const LeastSquaresOptions& options, bool prior) {
+  /// chi-square. `prior`: theta stays near where it is, while a few samples determine little of it.
+  double search_with(const LeastSquaresOptions& options, bool prior) {
     LeastSquaresProblem problem = problem_;
     for (std::size_t i = 0; prior && i < free_.size(); ++i) problem.terms.push_back(weak_prior(i, problem.unknowns[i]));
     const LeastSquaresResult result = solve_least_squares(problem, options);
     if (result.point.finite) take(result.point, problem_);
+    return result.point.chi2();
   }
 
   void add(std::size_t r, const VectorXd& c) {
@@ -282,13 +285,25 @@ class Decays {
   Index samples_ = 0;
 };
 
+/// From theta and c of `start`, with a law whose corners bend a trajectory so often that only records that grow lead to it, if any do. Infinite, and `joint` as it
+/// was, where that does not follow the decays.
+double follow_round_corners(JointProblem& joint, const GrowingTrust& start) {
+  constexpr double lost = 4, growth = 1.15;
+  JointProblem tried = start.joint();
+  Decays decays(tried, start.linear());
+  const double left = decays.search(growth, lost) ? decays.settle() : INFINITY;
+  if (!(left < followed)) return INFINITY;
+  joint = std::move(tried);
+  return left;
+}
+
 /// From theta and c of `start`: over the whole records and, where that does not follow them, over records that grow. Leaves the better in `joint`.
 double follow_exactly(JointProblem& joint, const GrowingTrust& start) {
   double least = INFINITY;
-  for (const bool growing : {false, true}) {
+  for (const double growth : {0.0, 1.5}) {
     JointProblem tried = start.joint();
     Decays decays(tried, start.linear());
-    decays.search(growing);
+    decays.search(growth);
     const double left = decays.settle();
     if (left < least) joint = std::move(tried);
     least = std::min(least, left);
@@ -307,7 +322,7 @@ bool takes_small_steps(const JointProblem& joint) {
 
 bool has_decays(const JointProblem& joint) { return std::any_of(joint.runs().begin(), joint.runs().end(), is_decay); }
 
-double fit_decays(JointProblem& joint, const std::string& id) {
+DecaysLeft fit_decays(JointProblem& joint, const std::string& id) {
   JointProblem start = joint;
   back_to_the_rig(start);
   for (RunResidual& run : start.runs())
@@ -332,14 +347,18 @@ double fit_decays(JointProblem& joint, const std::string& id) {
 
   if (takes_small_steps(joint)) {
     std::unique_ptr<GrowingTrust> best = trust(1, GrowingTrust::first_levels);
+    if (const double left = follow_round_corners(joint, *best); std::isfinite(left)) return {left, true};
     if (size != 0)
-      if (auto other = better_of_other_sizes(GrowingTrust::first_levels); other->better_than(*best)) best = std::move(other);
+      if (auto other = better_of_other_sizes(GrowingTrust::first_levels); other->better_than(*best)) {
+        best = std::move(other);
+        if (const double left = follow_round_corners(joint, *best); std::isfinite(left)) return {left, true};
+      }
     best->fit(GrowingTrust::trusted_levels);
     joint = best->joint();
     std::size_t d = 0;
     for (RunResidual& run : joint.runs())
       if (is_decay(run)) run.start_from(best->linear()[d++]);
-    return best->left_as_trusted();
+    return {best->left_as_trusted(), false};
   }
 
   const std::unique_ptr<GrowingTrust> first = trust(1, GrowingTrust::all_levels);
@@ -347,10 +366,10 @@ double fit_decays(JointProblem& joint, const std::string& id) {
   const double left = follow_exactly(found, *first);
   if (left > followed && size != 0) {
     const std::unique_ptr<GrowingTrust> other = better_of_other_sizes(GrowingTrust::all_levels);
-    if (const double others_left = other->better_than(*first) ? follow_exactly(joint, *other) : INFINITY; others_left < left) return others_left;
+    if (const double others_left = other->better_than(*first) ? follow_exactly(joint, *other) : INFINITY; others_left < left) return {others_left, true};
   }
   joint = std::move(found);
-  return left;
+  return {left, true};
 }
 
 }  // namespace unrig

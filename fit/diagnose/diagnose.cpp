@@ -237,7 +237,7 @@ Diagnosis diagnose(const DiagnoseProblem& problem) {
   const bool clean = leaves_nothing(best) || !d.remaining.found;
   const std::vector<ImprovedRun> unseen = problem.verdict_only ? std::vector<ImprovedRun>{} : predict_unseen(problem, fit_problem, baseline.arrival, best);
   const bool predicts = best.effects.empty() || power_over_noise(unseen, &ImprovedRun::rms_after) <= power_over_noise(unseen, &ImprovedRun::rms_before);
-  const bool follows_decays = decays_decide(best) && best.decays_left > 0 && best.decays_left < explained && excess(best) < half * excess(baseline);
+  const bool follows_decays = decays_decide(best) && best.decays.chi2 < explained && excess(best) < half * excess(baseline);
   const bool named = !best.effects.empty() && predicts && (clean || follows_decays || excess(best) < (1 - nearly_all) * excess(baseline));
   d.unexplained = d.mismatch.found && !(clean && predicts);
 

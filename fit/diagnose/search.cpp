@@ -111,8 +111,8 @@ void measure(Trial& trial) {
   trial.variables = 0;
   const std::vector<LeftOfRun> left = left_of_runs(joint);
   for (std::size_t r = 0; r < left.size(); ++r) {
-    const bool as_trusted = trial.decays_left > 0 && std::isfinite(trial.decays_left) && joint.runs()[r].motion().unknowns() == 0;
-    trial.variance.push_back(as_trusted ? std::max(1.0, trial.decays_left) : left[r].variance);
+    const bool as_trusted = !trial.decays.exactly && std::isfinite(trial.decays.chi2) && joint.runs()[r].motion().unknowns() == 0;
+    trial.variance.push_back(as_trusted ? std::max(1.0, trial.decays.chi2) : left[r].variance);
     trial.samples.push_back(left[r].independent);
     trial.angle_variance.push_back(left[r].angle_variance);
     trial.angle_samples.push_back(left[r].angle_samples);
@@ -212,11 +212,10 @@ bool fit_decays_first(Trial& trial, const Trial& base) {
   const double before = left_of_decays(base), followed = takes_small_steps(joint) ? 1.15 : 2;  // corners are seen where a fit with everything free loses its way
   if (!has_decays(joint) || before < followed) {
     measure(trial);
-    return true;
+    return !has_decays(joint) || !takes_small_steps(joint);  // a gap would show
   }
-  const double left = fit_decays(joint, trial.effects.back());
-  const bool helps = left - 1 < worth_it * (before - 1);
-  if (takes_small_steps(joint)) trial.decays_left = left;
+  trial.decays = fit_decays(joint, trial.effects.back());
+  const bool helps = trial.decays.chi2 - 1 < worth_it * (before - 1);
   measure(trial);
   if (helps)
     in_parallel(joint.runs().size(), [&](std::size_t r) {  // c of the others still is the baseline's

@@ -1,9 +1,11 @@
 #pragma once
+#include <cmath>
 #include <memory>
 #include <string>
 #include <vector>
 
 #include "fit/arrival.h"
+#include "fit/decays_first.h"
 
 namespace unrig {
 
@@ -16,7 +18,7 @@ struct Trial {
   std::vector<double> samples = {};    ///< per run: as many of them as the residual's colour leaves independent
   std::vector<double> angle_variance = {}, angle_samples = {};  ///< the same of the angle, where the motion is estimated; no samples elsewhere
   int variables = 0;
-  double decays_left = 0;  ///< where decays decide: what fit_decays left of them; 0: not asked
+  DecaysLeft decays = {INFINITY, true};  ///< what fit_decays left of them; infinite: not asked
 
   double reduced_chi2() const;    ///< over all runs, in units of the noise
 };
