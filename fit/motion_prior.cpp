@@ -15,7 +15,13 @@ using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
 constexpr int order = 4;
-constexpr Index group_size = 5;
+
+/// Differences of a smooth oscillation vanish twice a period. Where the shaft moves for long, five of them that happen to lie there would make the motion stiff, and the band of the
+/// load too narrow (a motion of twelve frequencies with 800 knots: nine standard deviations off in groups of five, two in groups of twenty): a fortieth of the window's knots.
+Index knots_per_group(const MotionBasis::Window& window) {
+  constexpr Index least = 5, most = 20, groups = 40;
+  return std::clamp<Index>(window.knots.length() / window.stride / groups, least, most);
+}
 
 /// Fourth differences of the fine coefficients over everything a window touches, one row each, over the motion unknowns.
 MatrixXd differences(const MotionBasis& motion, const MotionBasis::Window& window) {
@@ -108,7 +114,7 @@ MatrixXd motion_prior(const RunResidual& residual, const VectorXd& theta) {
   std::vector<Group> groups;
   for (const MotionBasis::Window& window : motion.windows()) {
     const MatrixXd d = differences(motion, window);
-    const Index size = group_size * window.stride;
+    const Index size = knots_per_group(window) * window.stride;
     for (Index first = 0; first < d.rows(); first += size) {
       Group group = touched(d.middleRows(first, std::min(size, d.rows() - first)), window);
       if (group.rows.cols() > 0) groups.push_back(std::move(group));

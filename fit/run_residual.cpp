@@ -35,16 +35,53 @@ double noise_of(const VectorXd& value) {
 
 }  // namespace
 
+namespace {
+
+/// How far a motion reaches into a rest beside it: a shaft that sets out softly has left its level long before a few samples show that it moves. Means over `block`
+/// samples, in turn from the motion on, until two lie on the rest's level. `mean(i)`: of block i.
+template <class Mean>
+Index soft_edge(Index blocks, Index block, double tolerance, Mean mean) {
+  std::vector<double> all;
+  for (Index i = 0; i < blocks; ++i)
+    if (const double m = mean(i); std::isfinite(m)) all.push_back(m);
+  if (all.size() < 4) return 0;  // too short to have a level
+  std::nth_element(all.begin(), all.begin() + static_cast<std::ptrdiff_t>(all.size() / 2), all.end());
+  const double level = all[all.size() / 2];
+  constexpr Index farthest = 25;  // blocks: a drift of the channel is no motion
+  Index reach = 0;
+  for (Index i = 0; i < std::min(blocks, farthest) && i < reach + 2; ++i)
+    if (std::abs(mean(i) - level) > tolerance) reach = i + 1;
+  constexpr Index unseen = 2;  // blocks: what sets out like t^3 is within the tolerance for as long again
+  return reach > 0 ? std::min(blocks, reach + unseen) * block : 0;
+}
+
+/// Where the shaft moves, soft beginnings and ends included.
+std::vector<Interval> moving_softly(const VectorXd& angle, double sigma) {
+  std::vector<Interval> intervals = moving(angle, sigma);
+  constexpr Index block = 20;
+  constexpr double chance = 4;  // standard deviations of a block's mean
+  const double tolerance = chance * sigma / std::sqrt(static_cast<double>(block));
+  const std::vector<Interval> hard = intervals;
+  for (std::size_t i = 0; i <= hard.size() && !hard.empty(); ++i) {  // the rest before interval i
+    const Index first = i == 0 ? 0 : hard[i - 1].last, last = i == hard.size() ? angle.size() : hard[i].first, blocks = (last - first) / block;
+    if (i < hard.size()) intervals[i].first -= soft_edge(blocks, block, tolerance, [&](Index k) { return angle.segment(last - (k + 1) * block, block).mean(); });
+    if (i > 0) intervals[i - 1].last += soft_edge(blocks, block, tolerance, [&](Index k) { return angle.segment(first + k * block, block).mean(); });
+  }
+  return intervals;
+}
+
+}  // namespace
+
 std::vector<MotionBasis::Window> motion_windows(const Run& run) {
   const Channel* alpha = run.find("alpha");
   if (!alpha || run.kind != RunKind::step) return {};
   const double sigma = noise_level(alpha->value);
   std::vector<MotionBasis::Window> windows;
   constexpr Index most_knots = 400;  // a motion that goes on and on gets coarser knots
-  for (const Interval& i : moving(alpha->value, sigma)) {
-    // The load goes with the second derivative: it starts before the angle visibly does, and the drive rings after it has arrived.
-    const Index before = std::max<Index>(8, i.length() / 2), after = std::max<Index>(60, 2 * i.length());
-    const Index last_knot = run.samples() - 5;
+  for (const Interval& i : moving_softly(alpha->value, sigma)) {
+    // The load goes with the second derivative: it starts before the angle visibly does, and the drive rings after it has arrived, no longer for having moved for long.
+    const Index before = std::clamp<Index>(i.length() / 2, 8, 100), after = std::clamp<Index>(2 * i.length(), 60, 300);
+    const Index last_knot = run.samples() - 2;  // a shaft that still moves when the record ends is free up to there
     MotionBasis::Window window{{std::max<Index>(0, i.first - before), std::min(last_knot, i.last + after)}, 1};
     if (!windows.empty() && window.knots.first <= windows.back().knots.last + 4)
       window.knots.first = windows.back().knots.first, windows.pop_back();

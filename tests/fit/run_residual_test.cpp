@@ -2,6 +2,10 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <cmath>
+#include <random>
+
 #include "core/error.h"
 #include "tests/fit/run_cases.h"
 #include "tests/support/slope.h"
@@ -213,6 +217,23 @@ TEST(MotionWindows, CoverTheStepsOfARun) {
   EXPECT_GT(windows[0].knots.last, 560) << "and rings for a while";
   EXPECT_EQ(windows[0].stride, 1);
   EXPECT_TRUE(motion_windows(read_run(test::null_campaign("wet_pluck.csv"))).empty());
+}
+
+TEST(MotionWindows, CoverASoftStartAndAShaftThatNeverStops) {
+  // Like t^3 from sample 500 on, then a sine to the end of the record: six samples show that it moves from about 530 on only.
+  unrig::Run run = read_run(test::null_campaign("step_a.csv"));
+  Channel& alpha = *std::find_if(run.channels.begin(), run.channels.end(), [](const Channel& c) { return c.name == "alpha"; });
+  std::mt19937_64 random(1);
+  std::normal_distribution<double> noise(0, 1.8e-4);
+  for (Index k = 0; k < run.samples(); ++k) {
+    const double t = run.dt * static_cast<double>(k - 500);
+    alpha.value[k] = (t > 0 ? 0.03 * std::min(1.0, std::pow(t / 0.3, 3)) * std::sin(4 * t) : 0) + noise(random);
+  }
+  const Windows windows = motion_windows(run);
+  ASSERT_EQ(windows.size(), 1u);
+  EXPECT_LE(windows[0].knots.first, 520) << "the angle is within its noise up to here";
+  EXPECT_GT(windows[0].knots.first, 350);
+  EXPECT_GE(windows[0].knots.last, run.samples() - 2) << "free to the end";
 }
 
 TEST(RunResidual, RefusesARunThatDoesNotBelong) {
