@@ -22,7 +22,7 @@ constexpr std::array sensor_kinds = {std::pair{"displacement", SensorKind::displ
                                      std::pair{"acceleration", SensorKind::acceleration}, std::pair{"twist", SensorKind::twist},
                                      std::pair{"twist_rate", SensorKind::twist_rate}};
 
-void check_magic(const TomlTable& file, const std::string& path) {
+void check_rig_version(const TomlTable& file, const std::string& path) {
   if (!file.has("unrig_rig")) {
     throw InputError({path, 1}, "the file does not say that it is a rig file", "wanted the line `unrig_rig = 1` at its head", "");
   }
@@ -214,7 +214,7 @@ void take_modes(const TomlTable& file, Rig& rig) {
 
 Rig read_rig(const std::string& path) {
   const TomlTable file = TomlTable::parse(read_text(path), path, "Text stands in double quotes, a remark begins with #.");
-  check_magic(file, path);
+  check_rig_version(file, path);
   Rig rig;
   rig.file = path;
   rig.name = file.text_or("name", std::filesystem::path(path).stem().string());

@@ -84,7 +84,7 @@ Calibration read_calibration(const TomlTable& meta, const std::string& key) {
   return calibration;
 }
 
-void check_magic(const TomlTable& meta, const std::string& path) {
+void check_run_version(const TomlTable& meta, const std::string& path) {
   if (!meta.has("unrig_run")) {
     throw InputError({path, 1}, "the file does not say that it is a run file", "wanted the line `# unrig_run = 1` at its head",
                      "Meta data are TOML in leading lines that begin with `# `.");
@@ -109,7 +109,7 @@ double not_negative(const TomlTable& meta, std::string_view key, std::string_vie
 }
 
 Run read_meta_data(const TomlTable& meta, const std::string& path) {
-  check_magic(meta, path);
+  check_run_version(meta, path);
   meta.allow_only({"unrig_run", "name", "kind", "medium", "density", "speed", "calibration", "force_calibration"});
   Run run;
   run.file = path;

@@ -74,7 +74,7 @@ void follow(Arrival& arrival, const FitProblem& problem, const std::vector<Index
   }
 }
 
-constexpr double explained = 2;  // reduced chi-square of a record that a model can be said to follow
+constexpr double followed_chi2 = 2;  // reduced chi-square of a record that a model can be said to follow
 
 /// Start values around those of `joint`: stiffness of torsion (of modal rigs: of every second mode) and of the others times a factor each, and damping ratios of modes that a
 /// resonance nearby still moves.
@@ -119,7 +119,7 @@ Arrival grow(Arrival start, const FitProblem& problem, const ArrivalEffort& effo
   const std::vector<Index> horizons = growing_horizons(problem.runs);
   Arrival arrival = start;
   follow(arrival, problem, horizons, 0, horizons.size(), effort);
-  if (!effort.other_starts || horizons.size() < 2 || arrival.reduced_chi2() < explained) return arrival;
+  if (!effort.other_starts || horizons.size() < 2 || arrival.reduced_chi2() < followed_chi2) return arrival;
   Arrival other = try_other_starts(start, problem, horizons, effort);
   return other.reduced_chi2() < arrival.reduced_chi2() ? other : arrival;
 }

@@ -29,7 +29,7 @@ constexpr double false_alarm = 1e-3;  // per record
 constexpr Index padding = 2;
 
 /// A place to look: where one more pole would lower chi-square, and by how much.
-struct Candidate {
+struct PoleCandidate {
   Pole pole;
   double gain = 0;       ///< fall of chi-square that the matched filter promises
   double threshold = 0;  ///< what noise alone reaches once in 1 / false_alarm records
@@ -65,7 +65,7 @@ VectorXd filtered_noise(const DecayModel& model, const VectorXd& residual) {
 }
 
 /// The most promising place for a further pole. `unit`: variance of the white noise in `residual`.
-Candidate look_for_pole(const DecayModel& model, const VectorXd& residual, double unit) {
+PoleCandidate look_for_pole(const DecayModel& model, const VectorXd& residual, double unit) {
   const std::vector<double> bank = window_bank(model);
   const double degrees = 2.0 * static_cast<double>(model.channels());
   // Tail of chi-square (B. Laurent and P. Massart, Ann. Stat. 28 (2000) 1302), exact for two degrees; all windows and lines count as trials.
@@ -74,7 +74,7 @@ Candidate look_for_pole(const DecayModel& model, const VectorXd& residual, doubl
   const double limit = (degrees - 2 + 2 * std::sqrt((degrees - 2) * log_odds) + 2 * log_odds) / degrees;
   const double spacing = 2 * pi / (model.dt() * static_cast<double>(padding * model.samples()));  // rad/s per line
   const VectorXd floor = filtered_noise(model, residual).cwiseMax(degrees * unit);
-  Candidate best;
+  PoleCandidate best;
   for (const double decay : bank) {
     const std::vector<Peak> peaks = peaks_above(matched_filter(model, residual, decay), floor, limit);
     if (!peaks.empty() && peaks.front().power > best.gain)
@@ -101,7 +101,7 @@ constexpr int search_iterations = 8;
 bool find_poles(const DecayModel& model, Index most, std::vector<Pole>& poles) {
   DecayModel::Evaluation now = model.evaluate(poles, false);
   while (true) {
-    const Candidate candidate = look_for_pole(model, now.residual, white_variance(model, now.chi2, poles.size()));
+    const PoleCandidate candidate = look_for_pole(model, now.residual, white_variance(model, now.chi2, poles.size()));
     if (candidate.gain == 0) return true;
     if (static_cast<Index>(poles.size()) >= most) return false;
     std::vector<Pole> trial = poles;

@@ -19,7 +19,7 @@ using u64 = std::uint64_t;
 enum Toc : u32 { toc_meta_data = 1 << 1, toc_new_objects = 1 << 2, toc_raw_data = 1 << 3, toc_interleaved = 1 << 5, toc_big_endian = 1 << 6, toc_daqmx = 1 << 7 };
 constexpr u64 lead_in_bytes = 28, unknown_length = std::numeric_limits<u64>::max();
 
-struct Type {
+struct DataType {
   u32 bytes = 0;  ///< 0: of no fixed size
   double (*read)(const char*, bool big_endian) = nullptr;  ///< null: no real number
   bool integer = false;
@@ -31,11 +31,11 @@ double read_as(const char* from, bool big_endian) {
 }
 
 template <class T>
-constexpr Type real() {
+constexpr DataType real() {
   return {sizeof(T), read_as<T>, std::numeric_limits<T>::is_integer};
 }
 
-Type type_of(u32 code) {
+DataType type_of(u32 code) {
   switch (code) {
     case 1: return real<std::int8_t>();
     case 2: return real<std::int16_t>();
@@ -58,22 +58,22 @@ Type type_of(u32 code) {
 }
 
 /// Raw scalers number their types in their own way.
-Type daqmx_type(u32 code) {
+DataType daqmx_type(u32 code) {
   constexpr u32 ordinary[] = {5, 1, 6, 2, 7, 3};
-  return code < 6 ? type_of(ordinary[code]) : Type{};
+  return code < 6 ? type_of(ordinary[code]) : DataType{};
 }
 
 /// One reading within the rows of a DAQmx buffer.
 struct Scaler {
-  Type type;
+  DataType type;
   u32 buffer = 0, offset = 0, id = 0;
 };
 
 /// What a segment says of an object's data.
-struct Index {
+struct RawIndex {
   bool has_data = false;
   u32 type_code = 0;
-  Type type;
+  DataType type;
   u64 count = 0;  ///< values per chunk
   u64 bytes = 0;  ///< per chunk
   std::vector<Scaler> scalers;    ///< DAQmx
@@ -83,7 +83,7 @@ struct Index {
 struct Object {
   std::string path;
   TdmsProperties properties;
-  Index index;
+  RawIndex index;
   std::map<u32, std::vector<double>> readings;
   bool integers = false, unreadable = false;
 };
@@ -231,7 +231,7 @@ class TdmsFile {
     } else if (code == 0x44) {
       reader.take(16);  // a date; nothing here needs it
     } else {
-      const Type type = type_of(code);
+      const DataType type = type_of(code);
       if (type.bytes == 0) refuse(at, fmt::format("the property \"{}\" is of the unknown type {:#x}", name, code));
       const std::string_view bytes = reader.take(type.bytes);
       if (type.read) properties[name] = type.read(bytes.data(), reader.is_big_endian());
@@ -295,7 +295,7 @@ class TdmsFile {
 
   /// Chunks of `count` rows; within a chunk one buffer after the other, each row by row.
   void read_daqmx(std::string_view data, const std::vector<Object*>& channels, bool big) {
-    const Index& first = channels.front()->index;
+    const RawIndex& first = channels.front()->index;
     u64 row = 0;
     for (const u32 width : first.row_widths) row += width;
     for (const Object* c : channels)
