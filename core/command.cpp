@@ -6,20 +6,32 @@
 
 namespace unrig {
 
+namespace {
+
+void erase_line() { std::fputs("\r\033[K", stderr); }
+
+bool line_shown = false;  // a warning must not begin at the end of it
+
+}  // namespace
+
 Progress::Progress() : terminal_(isatty(STDERR_FILENO) == 1) {}
 
 void Progress::operator()(const std::string& what) {
   if (!terminal_) return;
   std::fprintf(stderr, "\r\033[K%s ...", what.c_str());
   std::fflush(stderr);
-  shown_ = true;
+  shown_ = line_shown = true;
 }
 
 void Progress::clear() {
-  if (shown_) std::fputs("\r\033[K", stderr);
-  shown_ = false;
+  if (shown_ && line_shown) erase_line();
+  shown_ = line_shown = false;
 }
 
-void warn(const std::string& warning) { std::fprintf(stderr, "warning: %s\n", warning.c_str()); }
+void warn(const std::string& warning) {
+  if (line_shown) erase_line();
+  line_shown = false;
+  std::fprintf(stderr, "warning: %s\n", warning.c_str());
+}
 
 }  // namespace unrig

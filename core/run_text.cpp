@@ -44,6 +44,10 @@ std::string toml_string(std::string_view text) {
 }
 
 std::string run_text(const Run& run, const std::vector<std::string>& remarks) {
+  return whole_text([&](const TextSink& sink) { run_text(sink, run, remarks); });
+}
+
+void run_text(const TextSink& sink, const Run& run, const std::vector<std::string>& remarks) {
   std::string text = "# unrig_run = 1\n";
   for (const std::string& remark : remarks) text += "# # " + remark + "\n";
   text += fmt::format("# name = {}\n# kind = {}\n", toml_string(run.name), toml_string(to_string(run.kind)));
@@ -58,7 +62,9 @@ std::string run_text(const Run& run, const std::vector<std::string>& remarks) {
     text += fmt::format(",{} [{}]", channel.name, unit.unit.empty() ? "1" : unit.unit);
   }
   text += '\n';
+  sink(text);
   for (Eigen::Index k = 0; k < run.samples(); ++k) {
+    text.clear();
     auto out = std::back_inserter(text);
     fmt::format_to(out, "{:.10g}", run.time(k));
     for (std::size_t c = 0; c < run.channels.size(); ++c) {
@@ -69,8 +75,8 @@ std::string run_text(const Run& run, const std::vector<std::string>& remarks) {
         text += ",nan";
     }
     text += '\n';
+    sink(text);
   }
-  return text;
 }
 
 }  // namespace unrig

@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "core/run.h"
+#include "core/text_file.h"
 
 namespace unrig {
 
@@ -13,6 +14,8 @@ namespace unrig {
 /// A channel stands in the unit of the file it came from; one that was calibrated (volts to newtons) or shifted (degC) stands in SI, and so
 /// the calibration is not repeated. Numbers carry ten significant digits, missing samples are `nan`.
 std::string run_text(const Run& run, const std::vector<std::string>& remarks = {});
+/// The same row by row, for files that are long.
+void run_text(const TextSink& sink, const Run& run, const std::vector<std::string>& remarks);
 
 /// `text` as a TOML basic string, quotes included.
 std::string toml_string(std::string_view text);

@@ -11,6 +11,7 @@
 #include <filesystem>
 #include <optional>
 #include <string_view>
+#include <system_error>
 #include <utility>
 
 #include "core/error.h"
@@ -67,10 +68,35 @@ bool write_all(int file, std::string_view text) {
   return true;
 }
 
+/// Gathers what comes into blocks that are worth a call of the system. False with errno where one cannot be written; the source is then not asked for more.
+bool write_pieces(int file, const TextSource& text) {
+  const std::size_t block = 1 << 16;
+  std::string waiting;
+  const auto write = [&](std::string_view piece) {
+    if (!write_all(file, piece)) throw std::system_error(errno, std::generic_category());
+  };
+  try {
+    text([&](std::string_view piece) {
+      if (waiting.size() + piece.size() < block) {
+        waiting += piece;
+        return;
+      }
+      write(waiting);
+      waiting.clear();
+      write(piece);
+    });
+    write(waiting);
+    return true;
+  } catch (const std::system_error& failure) {
+    errno = failure.code().value();
+    return false;
+  }
+}
+
 /// Pipes and devices cannot be renamed over, and keep no half-written file either.
-void write_directly(const std::string& path, const std::string& text) {
+void write_directly(const std::string& path, const TextSource& text) {
   OpenFile file(path, O_WRONLY | O_APPEND);
-  if (!file.is_open() || !write_all(file.number(), text) || !file.close()) refuse_write(path, reason());
+  if (!file.is_open() || !write_pieces(file.number(), text) || !file.close()) refuse_write(path, reason());
 }
 
 /// The file that `path` means: the end of a chain of symbolic links, which stay as they are.
@@ -104,8 +130,8 @@ class TemporaryFile {
   TemporaryFile& operator=(const TemporaryFile&) = delete;
 
   /// False with errno where a step fails. fsync comes before the name: a crash leaves the old file or the whole new one.
-  bool replace_target_with(std::string_view text) {
-    if (!file_.is_open() || !write_all(file_.number(), text) || ::fsync(file_.number()) != 0) return false;
+  bool replace_target_with(const TextSource& text) {
+    if (!file_.is_open() || !write_pieces(file_.number(), text) || ::fsync(file_.number()) != 0) return false;
     if (!named_) named_ = ::linkat(AT_FDCWD, link().c_str(), AT_FDCWD, path_.c_str(), AT_SYMLINK_FOLLOW) == 0;
     if (!named_ || !file_.close() || ::rename(path_.c_str(), target_.c_str()) != 0) return false;
     named_ = false;
@@ -165,7 +191,19 @@ std::string read_text(const std::string& path) {
   return text;
 }
 
+std::string whole_text(const TextSource& text) {
+  std::string whole;
+  text([&](std::string_view piece) { whole += piece; });
+  return whole;
+}
+
+std::string base_name(const std::string& path) { return fs::path(path).filename().string(); }
+
 void write_text(const std::string& path, const std::string& text) {
+  write_text(path, [&](const TextSink& sink) { sink(text); });
+}
+
+void write_text(const std::string& path, const TextSource& text) {
   const auto old = status(path);
   if (old && S_ISDIR(old->st_mode)) refuse_write(path, std::strerror(EISDIR));
   // /dev/stdout may lead to a regular file: whoever opened it goes on writing to it, so it must not be replaced.

@@ -14,9 +14,11 @@ namespace unrig {
 namespace {
 
 template <class Result>
-int finish(const Result& result, const std::string& output) {
+int finish(const Result& result, const std::string& output, Progress& progress) {
   for (const std::string& warning : result.warnings) warn(warning);
-  write_text(output, to_csv(result));
+  progress("writing " + output);
+  write_text(output, [&](const TextSink& sink) { to_csv(sink, result); });
+  progress.clear();
   fmt::print("{}", report(result));
   return exit_done;
 }
@@ -43,15 +45,18 @@ int correct_command(int argc, char** argv) {
   } catch (const CLI::ParseError& e) {
     return app.exit(e) == 0 ? exit_done : exit_wrong_use;
   }
+  Progress progress;
+  progress("reading " + run_path);
   const CorrectProblem problem{read_rig(rig_path), read_fit(fit_path), read_run(run_path), calibration, imposed};
+  progress("taking the rig out of " + run_path);
   if (problem.rig.is_modal()) {
     if (imposed.any() || !indicial.empty())
       throw InputError({rig_path, 0}, "a rig known only as modes", "wanted a rig with a section for an indicial response", "Leave out --indicial, --monotone and --at-step.");
-    return finish(modal_load(problem), output);
+    return finish(modal_load(problem), output, progress);
   }
   const CorrectResult result = correct(problem);
   if (!indicial.empty()) write_text(indicial, to_indicial_csv(result));
-  return finish(result, output);
+  return finish(result, output, progress);
 }
 
 }  // namespace unrig

@@ -28,8 +28,13 @@ void further_cells(Out out, const Row& by_source, double band, double half, doub
 }  // namespace
 
 std::string to_csv(const CorrectResult& r) {
+  return whole_text([&](const TextSink& sink) { to_csv(sink, r); });
+}
+
+void to_csv(const TextSink& sink, const CorrectResult& r) {
   std::string text = "time [s],semichords,gauge [N],normal_force [N],normal_force_std [N],circulatory [N],circulatory_std [N],cn,cn_std";
   text += further_columns("circulatory", " [N]") + further_columns("normal_force", " [N]") + ",unexplained [N]\n";
+  sink(text);
   const CorrectedLoad &normal = r.normal_force, &circulatory = r.circulatory;
   fmt::memory_buffer row;
   auto out = std::back_inserter(row);
@@ -45,10 +50,8 @@ std::string to_csv(const CorrectResult& r) {
     row.push_back(',');
     if (std::isfinite(r.unexplained[k])) fmt::format_to(out, "{:.4g}", r.unexplained[k]);
     row.push_back('\n');
-    if (k == 0) text.reserve(text.size() + static_cast<std::size_t>(r.gauge.size()) * (row.size() + row.size() / 10));
-    text.append(row.data(), row.size());
+    sink({row.data(), row.size()});
   }
-  return text;
 }
 
 std::string to_indicial_csv(const CorrectResult& r) {

@@ -1,12 +1,15 @@
 #pragma once
 #include <string>
 
+#include "core/text_file.h"
 #include "correct/correct.h"
 
 namespace unrig {
 
 /// `corrected.csv` (columns as in formats.md, section 4), its origin and units in leading comment lines.
 std::string to_csv(const CorrectResult& result);
+/// The same row by row, for files that are long.
+void to_csv(const TextSink& sink, const CorrectResult& result);
 /// `indicial.csv`: semichords,indicial,indicial_std.
 std::string to_indicial_csv(const CorrectResult& result);
 /// What a person wants to know.

@@ -187,20 +187,26 @@ ModalLoad modal_load(const CorrectProblem& problem) {
 }
 
 std::string to_csv(const ModalLoad& r) {
+  return whole_text([&](const TextSink& sink) { to_csv(sink, r); });
+}
+
+void to_csv(const TextSink& sink, const ModalLoad& r) {
   std::string text = fmt::format("time [s],gauge [{0}],normal_force [{0}],normal_force_std [{0}]", r.unit);
   for (Index s = 0; s < sources; ++s)
     if (s != static_cast<Index>(Source::angle)) text += fmt::format(",normal_force_std_{} [{}]", source_names[static_cast<std::size_t>(s)], r.unit);
   text += fmt::format(",normal_force_band95 [{0}],normal_force_half_weight [{0}],normal_force_twice_weight [{0}],from_inputs [{0}]\n", r.unit);
-  auto out = std::back_inserter(text);
+  sink(text);
   for (Index k = 0; k < r.load.size(); ++k) {
+    text.clear();
+    auto out = std::back_inserter(text);
     fmt::format_to(out, "{:.9g},", r.start + static_cast<double>(k) * r.dt);
     if (std::isfinite(r.gauge[k])) fmt::format_to(out, "{:.6g}", r.gauge[k]);
     fmt::format_to(out, ",{:.6g},{:.4g}", r.load[k], r.std[k]);
     for (Index s = 0; s < sources; ++s)
       if (s != static_cast<Index>(Source::angle)) fmt::format_to(out, ",{:.3g}", r.by_source(k, s));
     fmt::format_to(out, ",{:.4g},{:.6g},{:.6g},{:.6g}\n", r.simultaneous * r.std[k], r.half_weight[k], r.twice_weight[k], r.from_inputs[k]);
+    sink(text);
   }
-  return text;
 }
 
 std::string report(const ModalLoad& r) {

@@ -2,11 +2,11 @@
 
 #include <algorithm>
 #include <cmath>
-#include <filesystem>
 #include <numbers>
 
 #include <fmt/format.h>
 
+#include "core/text_file.h"
 #include "fit/rig_frequencies.h"
 
 namespace unrig {
@@ -18,8 +18,6 @@ using std::numbers::pi;
 void tell(const ApparentMassProblem& problem, const std::string& what) {
   if (problem.progress) problem.progress(what);
 }
-
-std::string base_name(const std::string& path) { return std::filesystem::path(path).filename().string(); }
 
 void check_run(const Run& run, const char* which) {
   if (run.kind != RunKind::pluck)

@@ -2,10 +2,11 @@
 
 #include <algorithm>
 #include <cmath>
-#include <filesystem>
 
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
+
+#include "core/text_file.h"
 
 namespace unrig {
 namespace {
@@ -13,8 +14,6 @@ namespace {
 using nlohmann::json;
 
 const char* name_of(ApparentMassMethod method) { return method == ApparentMassMethod::mode_shapes ? "mode shapes" : "frequency ratio"; }
-
-std::string base_name(const std::string& path) { return std::filesystem::path(path).filename().string(); }
 
 /// JSON knows no NaN.
 json number(double x) { return std::isfinite(x) ? json(x) : json(nullptr); }

@@ -1,13 +1,13 @@
 #include "fit/fit_files.h"
 
 #include <cmath>
-#include <filesystem>
 
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
 #include "core/effects/effect.h"
 #include "core/text_file.h"
+#include "fit/fit_json.h"
 
 namespace unrig {
 namespace {
@@ -25,8 +25,6 @@ const char* name_of(Wagner which) {
 
 /// JSON knows no NaN.
 json number(double x) { return std::isfinite(x) ? json(x) : json(nullptr); }
-
-std::string base_name(const std::string& path) { return std::filesystem::path(path).filename().string(); }
 
 template <class Named>
 std::string label(const Named& p) { return p.run.empty() ? p.name : p.name + " (" + base_name(p.run) + ")"; }
@@ -94,10 +92,22 @@ std::string to_json(const FitResult& r) {
   return out.dump(2) + "\n";
 }
 
+namespace {
+
+InputError no_fit(const std::string& path, const std::string& found) {
+  return {{path, 0}, found, "wanted a fit.json written by `unrig fit`", "Give the file that `unrig fit -o` wrote."};
+}
+
+}  // namespace
+
 FittedRig read_fit(const std::string& path) {
-  const auto refuse = [&](const std::string& found) -> InputError { return {{path, 0}, found, "wanted a fit.json written by `unrig fit`", "Give the file that `unrig fit -o` wrote."}; };
   const json in = json::parse(read_text(path), nullptr, false);
-  if (in.is_discarded()) throw refuse("not valid JSON");
+  if (in.is_discarded()) throw no_fit(path, "not valid JSON");
+  return read_fit(in, path);
+}
+
+FittedRig read_fit(const json& in, const std::string& path) {
+  const auto refuse = [&](const std::string& found) { return no_fit(path, found); };
   if (!in.is_object() || in.value("unrig", "") != "fit") throw refuse("no key \"unrig\" with the value \"fit\"");
   try {
     FittedRig fit;

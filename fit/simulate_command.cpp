@@ -178,9 +178,13 @@ int simulate_command(int argc, char** argv) {
   }
 
   const SimulateProblem problem = problem_of(options);
+  Progress progress;
+  progress("simulating " + options.run);
   const SimulateResult result = simulate(problem);
   for (const std::string& warning : result.warnings) warn(warning);
-  write_text(options.output, run_text(result.run, recipe(problem)));
+  progress("writing " + options.output);
+  write_text(options.output, [&](const TextSink& sink) { run_text(sink, result.run, recipe(problem)); });
+  progress.clear();
   print_summary(problem, result, options.output);
   print_comparison(problem.run, result);
   return exit_done;

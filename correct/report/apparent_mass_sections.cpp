@@ -74,11 +74,11 @@ void add_apparent_mass(ReportPage& page, const json& result, const std::string& 
   const std::string name = file_name(path), unit = text_of(result.at("apparent_mass"), "unit");
   const double theory = number_of(result.value("theory", json::object()), "value");
   std::string text = fmt::format("The fluid adds {} {}", estimate(result, "apparent_mass"), unit);
-  if (std::isfinite(theory)) text += fmt::format(", {} times the theory's {:.4g} {} (pi rho b^2)", estimate(result, "apparent_mass_coefficient"), theory, unit);
+  if (std::isfinite(theory)) text += fmt::format(", {} times the theory's {:.4g} {} (π ρ b²)", estimate(result, "apparent_mass_coefficient"), theory, unit);
   page.add_verdict(Tone::good, text + ".", name);
   page.add_section("Apparent mass: " + name);
   std::vector<std::vector<std::string>> rows{{"apparent mass", estimate(result, "apparent_mass"), unit}};
-  if (std::isfinite(theory)) rows.push_back({"theory, pi rho b^2", plain(theory, 6), unit});
+  if (std::isfinite(theory)) rows.push_back({"theory, π ρ b²", plain(theory, 6), unit});
   rows.push_back({"coefficient (over theory)", estimate(result, "apparent_mass_coefficient"), ""});
   if (result.contains("joint_fit")) rows.push_back({"the same from a joint fit of both decays", estimate(result, "joint_fit"), text_of(result["joint_fit"], "unit") == "1" ? "" : text_of(result["joint_fit"], "unit")});
   page.add_table("", {"quantity", "value ± one standard error", "unit"}, rows, "Method: " + text_of(result, "method") + ". " + text_of(result, "agreement"));

@@ -79,8 +79,10 @@ void add_modal_load(ReportPage& page, const std::string& text, const std::string
                  "The rig is known only as modes: the load is what the gauge would read of it if the rig were rigid and its mount at rest.", false, false, 320});
   page.add_plot({"Gauge and what the measured inputs do to it", time_label, labelled("reading", gauge.unit), t,
                  {{"gauge reading", 0, gauge.value}, {"from the measured inputs", 2, inputs.value}}, name, "Inputs are the motion of the mount and a measured force."});
-  add_spectra(page, "Spectra before and after the correction", dt, load.unit, {"gauge reading", 0, gauge.value}, {"rigid-rig load", 1, load.value, {}, true},
-              "Amplitude of the whole record, mean removed, Hann window. What the rig adds stands in the reading only.");
+  page.add_plot({"The load alone", time_label, labelled("load", load.unit), t, {{"rigid-rig load", 1, load.value, load_std.value}}, name,
+                 "With its band, on a scale of its own. It is smoothed as far as the noise demands: what is faster than its bandwidth is left out."});
+  add_spectra(page, "Spectra before and after the correction", dt, load.unit, {"gauge reading", 0, gauge.value}, {"reading less what the inputs do", 1, gauge.value - inputs.value},
+              "Amplitude of the whole record, mean removed, Hann window. What stands out of both is a load, or a mode that the rig file does not have.");
 }
 
 void add_indicial(ReportPage& page, const std::string& text, const std::string& path) {

@@ -1,11 +1,15 @@
 #include <algorithm>
 #include <cmath>
 #include <numeric>
+#include <optional>
 
 #include <fmt/format.h>
 
+#include "core/command.h"
 #include "core/error.h"
+#include "correct/report/fit_traces.h"
 #include "correct/report/result_files.h"
+#include "fit/fit_json.h"
 
 namespace unrig {
 namespace {
@@ -144,7 +148,7 @@ void add_restoring_force(ReportPage& page, const json& map) {
   const bool grid = !z.empty() && z.front().is_array();
   if (z.empty() || (grid ? z.size() != y.size() : z.size() != x.size() || z.size() != y.size())) return page.add_text("Warning: the restoring-force map is incomplete and left out.");
   if (grid) {
-    HeatMap heat{"What the model lacks, by the state of the rig", x_label, y_label, z_label, doubles(x), doubles(y), {}, "Mean over cells of displacement and velocity of the first normal mode, in the best model with nothing added; white where the rig never was.", false, true};
+    HeatMap heat{"What the model lacks, by the state of the rig", x_label, y_label, z_label, doubles(x), doubles(y), {}, "Mean over cells of displacement and velocity of the first normal mode, in the best model with nothing added; grey where the rig never was.", false, true};
     for (const json& row : z) heat.z.push_back(doubles(row));
     return page.add_map(heat);
   }
@@ -157,31 +161,79 @@ void add_restoring_force(ReportPage& page, const json& map) {
   }
 }
 
-void add_diagnosed_traces(ReportPage& page, const json& t, const std::string& file, const std::string& unit) {
-  const VectorXd time = vector(member(t, "time", json::array())), measured = vector(member(t, "measured", json::array())), before = vector(member(t, "before", json::array())),
-                 after = vector(member(t, "after", json::array())), force = vector(member(t, "missing_force", json::array())), force_std = vector(member(t, "missing_force_std", json::array()));
+/// A channel of a run: the recording, the best model with nothing added and the one with what was found.
+struct DiagnosedTrace {
+  std::string channel, unit;
+  VectorXd time, measured, before, after, force, force_std;
+};
+
+DiagnosedTrace read_trace(const json& t, const std::string& unit) {
+  const auto values = [&](const char* key) { return vector(member(t, key, json::array())); };
+  return {"", unit, values("time"), values("measured"), values("before"), values("after"), values("missing_force"), values("missing_force_std")};
+}
+
+void add_diagnosed_traces(ReportPage& page, const DiagnosedTrace& trace, const std::string& file) {
+  const auto& [channel, unit, time, measured, before, after, force, force_std] = trace;
+  const std::string of = channel.empty() ? "" : channel + ": ";
   const auto fits = [&](const VectorXd& x) { return x.size() == time.size() && time.size() > 1; };
   if (!fits(measured)) return;
-  Plot records{"Recording and models", "time [s]", labelled("reading", unit), time, {{"recording", 0, measured}}, file};
-  Plot left{"Residuals", "time [s]", labelled("recording − model", unit), time, {}, file};
+  Plot records{of + "recording and models", "time [s]", labelled("reading", unit), time, {{"recording", 0, measured}}, file};
+  Plot left{of + "residuals", "time [s]", labelled("recording − model", unit), time, {}, file};
   left.height = 200;
   const auto add = [&](const char* name, int colour, const VectorXd& model, bool dashed) {
     if (!fits(model)) return;
     records.curves.push_back({fmt::format("model {}", name), colour, model, {}, dashed});
     left.curves.push_back({fmt::format("residual {}", name), colour, measured - model});
   };
-  add("before", 2, before, true);
-  add("after", 1, after, true);
+  add("with nothing added", 2, before, true);
+  add("with what was found", 1, after, true);
   page.add_plot(records);
   if (!left.curves.empty()) page.add_plot(left);
   if (fits(force)) page.add_plot({"Force that the model lacks", "time [s]", labelled("missing force", "N"), time, {{"missing force", 3, force, fits(force_std) ? force_std : VectorXd()}}, file});
   const double dt = (time[time.size() - 1] - time[0]) / static_cast<double>(time.size() - 1);
   if (fits(before) && fits(after))
-    add_spectra(page, "Spectra of the residual before and after", dt, unit, {"residual before", 2, measured - before}, {"residual after", 1, measured - after}, "Means removed, Hann window.");
+    add_spectra(page, of + "spectra of the residual before and after", dt, unit, {"residual with nothing added", 2, measured - before},
+                {"residual with what was found", 1, measured - after}, "Amplitude of the whole record, mean removed, Hann window.");
+}
+
+/// The two models that a diagnosis compares, and where its recordings are.
+struct Models {
+  Rig rig;
+  FittedRig before, after;
+};
+
+/// The fit stands in the file; what the parameters were without the effect is its price of ignorance. Nothing where the rig is not found.
+std::optional<Models> read_models(ReportPage& page, const json& result, const std::string& path, const ReportOptions& options) {
+  const json fit = member(result, "fit", json::object());
+  if (fit.empty()) return std::nullopt;
+  const auto rig_file = found_file(text_of(fit, "rig"), path, options);
+  if (!rig_file) {
+    const std::string text = fmt::format("The rig \"{}\" is not found, so that recordings and models are left out; --data FOLDER says where recordings and rig are.", text_of(fit, "rig"));
+    warn(path + ": " + text);
+    page.add_text("Warning: " + text);
+    return std::nullopt;
+  }
+  Models models{read_rig(*rig_file), {}, read_fit(fit, path)};
+  models.before = models.after;
+  models.before.effects.clear();
+  for (const json& p : member(result, "price_of_ignorance", json::array()))
+    for (FittedParameter& parameter : models.before.parameters)
+      if (const double without = number_of(p, "without"); std::isfinite(without) && parameter.name == text_of(p, "name") && parameter.run == text_of(p, "run")) parameter.value = without;
+  return models;
+}
+
+/// The load cells and whatever else was fitted, without the angle, which both models follow.
+void add_models(ReportPage& page, const Models& models, const Run& run) {
+  const std::vector<FitTrace> after = fit_traces(models.rig, models.after, run);
+  const std::vector<FitTrace> before = models.after.effects.empty() ? after : fit_traces(models.rig, models.before, run);
+  const VectorXd time = VectorXd::LinSpaced(run.samples(), run.start, run.time(run.samples() - 1));
+  for (std::size_t c = 0; c < after.size(); ++c)
+    if (after[c].name != "alpha")
+      add_diagnosed_traces(page, {after[c].name, after[c].unit, time, after[c].measured, models.after.effects.empty() ? VectorXd() : before[c].model, after[c].model, {}, {}}, run.file);
 }
 
 /// What the file says of one run, wherever it says it: improvement.runs, or lists of their own.
-void add_run(ReportPage& page, const json& result, const json& run) {
+void add_run(ReportPage& page, const json& result, const json& run, const std::optional<Models>& models, const std::string& path, const ReportOptions& options) {
   const std::string file = text_of(run, "file");
   json all = run;
   for (const char* list : {"runs", "map", "maps", "traces"}) {
@@ -196,16 +248,20 @@ void add_run(ReportPage& page, const json& result, const json& run) {
     }
   }
   const json traces = member(all, "traces", json::object()), map = member(all, "map", json::object());
-  if (traces.empty() && map.empty()) return;
+  const auto recording = models && !run.value("left_out", false) ? found_file(file, path, options) : std::nullopt;
+  if (traces.empty() && map.empty() && !recording) return;
   page.add_section("Recording: " + file_name(file));
-  if (!traces.empty()) add_diagnosed_traces(page, traces, file, text_of(traces, "unit").empty() ? text_of(run, "unit") : text_of(traces, "unit"));
+  if (!traces.empty())
+    add_diagnosed_traces(page, read_trace(traces, text_of(traces, "unit").empty() ? text_of(run, "unit") : text_of(traces, "unit")), file);
+  else if (recording)
+    add_models(page, *models, read_run(*recording));
   if (const json m = member(map, "time_frequency", json::object()); !m.empty()) add_time_frequency(page, m);
   if (const json m = member(map, "restoring_force", json::object()); !m.empty()) add_restoring_force(page, m);
 }
 
 }  // namespace
 
-void add_diagnosis(ReportPage& page, const json& result, const std::string& path) {
+void add_diagnosis(ReportPage& page, const json& result, const std::string& path, const ReportOptions& options) {
   if (!result.contains("mismatch") || !result.contains("missing")) throw InputError({path, 0}, "no \"mismatch\" or no \"missing\"", "wanted a diagnosis.json written by `unrig diagnose`", "");
   add_verdicts(page, result, file_name(path));
   page.add_section("Diagnosis: " + file_name(path));
@@ -215,7 +271,8 @@ void add_diagnosis(ReportPage& page, const json& result, const std::string& path
   const json improvement = member(result, "improvement", json::object());
   add_improvement(page, improvement);
   add_price(page, member(result, "price_of_ignorance", json::array()));
-  for (const json& run : member(improvement, "runs", json::array())) add_run(page, result, run);
+  const std::optional<Models> models = read_models(page, result, path, options);
+  for (const json& run : member(improvement, "runs", json::array())) add_run(page, result, run, models, path, options);
 }
 
 }  // namespace unrig

@@ -164,10 +164,23 @@
     return found;
   }
 
+  // Without the rows and columns at the rim that hold nothing, but for one.
+  function cropped(block) {
+    const range = (count, holds) => {
+      const held = [...Array(count).keys()].filter(holds);
+      return held.length ? [Math.max(0, held[0] - 1), Math.min(count, held[held.length - 1] + 2)] : [0, count];
+    };
+    const something = (z) => z !== null && z !== undefined;
+    const [left, right] = range(block.x.length, (i) => block.z.some((row) => something(row[i])));
+    const [low, high] = range(block.y.length, (j) => block.z[j].some(something));
+    return {...block, x: block.x.slice(left, right), y: block.y.slice(low, high), z: block.z.slice(low, high).map((row) => row.slice(left, right))};
+  }
+
   // z over x (columns) and y (rows, the first at the bottom), with its scale at the right.
   function map(parent, block) {
     const figure = make('figure', parent);
     if (block.title) make('h3', figure, block.title);
+    if (block.signed) block = cropped(block);
     const canvas = make('canvas', figure, undefined, 'map');
     canvas.setAttribute('role', 'img');
     canvas.setAttribute('aria-label', `${block.title}: ${block.z_label} over ${block.x_label} and ${block.y_label}`);
@@ -203,6 +216,8 @@
       const c = canvas.getContext('2d'), left = 76, right = 110, bottom = 46, top = 10, w = width - left - right, h = height - top - bottom;
       c.scale(sharp, sharp);
       c.imageSmoothingEnabled = false;
+      c.fillStyle = dark() ? '#3a4046' : '#c4c8cc';  // seen where a cell is empty, and no colour of either scale
+      if (block.signed) c.fillRect(left, top, w, h);
       c.drawImage(image, left, top, w, h);
       c.fillStyle = c.strokeStyle = colours().ink;
       c.strokeRect(left, top, w, h);

@@ -22,7 +22,7 @@ void add_json(ReportPage& page, const std::string& text, const std::string& path
   try {
     if (kind == "fit") return add_fit(page, result, path, options);
     if (kind == "apparent-mass") return add_apparent_mass(page, result, path, options);
-    if (kind == "diagnosis") return add_diagnosis(page, result, path);
+    if (kind == "diagnosis") return add_diagnosis(page, result, path, options);
   } catch (const json::exception& e) {
     throw InputError({path, 0}, e.what(), wanted, "");
   }
@@ -66,7 +66,7 @@ int report_command(int argc, char** argv) {
   progress.clear();
   const std::string html = page.html();
   write_text(output, html);
-  fmt::print("{}: {} results, {:.2f} MB\n", output, results.size(), static_cast<double>(html.size()) / 1e6);
+  fmt::print("{}: {} result{}, {:.2f} MB\n", output, results.size(), results.size() == 1 ? "" : "s", static_cast<double>(html.size()) / 1e6);
   return exit_done;
 }
 

@@ -36,7 +36,7 @@ std::string labelled(const std::string& name, const std::string& unit);
 /// `unrig` writes it; what the result only refers to (recordings) may be absent, which is warned of.
 void add_fit(ReportPage& page, const nlohmann::json& result, const std::string& path, const ReportOptions& options);
 void add_apparent_mass(ReportPage& page, const nlohmann::json& result, const std::string& path, const ReportOptions& options);
-void add_diagnosis(ReportPage& page, const nlohmann::json& result, const std::string& path);
+void add_diagnosis(ReportPage& page, const nlohmann::json& result, const std::string& path, const ReportOptions& options);
 void add_corrected(ReportPage& page, const std::string& text, const std::string& path);
 /// `unrig correct` on a rig that is known only as modes.
 void add_modal_load(ReportPage& page, const std::string& text, const std::string& path);

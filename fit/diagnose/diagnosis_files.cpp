@@ -1,12 +1,12 @@
 #include "fit/diagnose/diagnosis_files.h"
 
 #include <cmath>
-#include <filesystem>
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 #include <nlohmann/json.hpp>
 
+#include "core/text_file.h"
 #include "fit/fit_files.h"
 
 namespace unrig {
@@ -43,8 +43,6 @@ ordered_json map_json(const ResidualMaps& m) {
                               {"force", rows(m.force->force)}, {"force_unit", m.force->force_unit}};
   return map;
 }
-
-std::string base_name(const std::string& path) { return std::filesystem::path(path).filename().string(); }
 
 std::string set_name(const std::vector<std::string>& effects) { return effects.empty() ? "nothing missing" : fmt::format("{}", fmt::join(effects, " + ")); }
 

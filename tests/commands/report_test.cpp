@@ -118,6 +118,7 @@ TEST(Report, ShowsALoadOnARigThatIsKnownOnlyAsModes) {
   EXPECT_TRUE((*plot)["series"][1].contains("std"));
   EXPECT_EQ((*plot)["y_label"], "reading [N]");
   ASSERT_TRUE(plot_titled(data, "Gauge and what the measured inputs do to it"));
+  ASSERT_TRUE(plot_titled(data, "The load alone"));
   ASSERT_TRUE(plot_titled(data, "Spectra before and after the correction"));
 }
 
@@ -135,6 +136,41 @@ TEST(Report, ShowsADiagnosis) {
   EXPECT_TRUE(maps[1]["z"][1][2].is_null());
   EXPECT_EQ(blocks(data, "plot").size(), 4u);
   EXPECT_EQ(blocks(data, "table").size(), 4u);
+}
+
+TEST(Report, ADiagnosisShowsItsRecordingsAndBothModels) {
+  const TemporaryDirectory directory;
+  const std::string wave = test::source_path("sample_data/campaigns/wave/"), without = directory.path("without.json"), with = directory.path("with.json");
+  std::vector<std::string> fit{"fit", "--rig", wave + "rig.toml", wave + "dry_pluck.csv", wave + "wet_pluck.csv", wave + "step_a.csv", "-o", without};
+  ASSERT_GE(run_unrig(directory, fit).status, 0);
+  fit.back() = with;
+  fit.insert(fit.end(), {"--effect", "tank-wave"});
+  ASSERT_EQ(run_unrig(directory, fit).status, 0);
+  // What `unrig diagnose` would write of these two.
+  json diagnosis = made_up_diagnosis();
+  diagnosis["fit"] = json::parse(read_text(with));
+  const json before = json::parse(read_text(without)), parameters = before["parameters"];
+  for (const json& p : parameters) diagnosis["price_of_ignorance"].push_back({{"name", p["name"]}, {"run", p.value("run", "")}, {"without", p["value"]}, {"with", 0}, {"std_error", 1}, {"unit", ""}});
+  diagnosis["improvement"]["runs"] = {{{"file", wave + "step_a.csv"}, {"heldout", false}, {"rms_before", 0.2}, {"rms_after", 0.011}, {"noise", 0.01}, {"unit", "N"}}};
+  const std::string output = directory.path("report.html");
+  const Finished finished = run_unrig(directory, {"report", directory.file("diagnosis.json", diagnosis.dump()), "-o", output});
+  ASSERT_EQ(finished.status, 0) << finished.err;
+  const json data = page_data(output);
+  ASSERT_TRUE(plot_titled(data, "gauge: recording and models"));
+  EXPECT_EQ((*plot_titled(data, "gauge: recording and models"))["series"].size(), 3u);
+  ASSERT_TRUE(plot_titled(data, "gauge: spectra of the residual before and after"));
+  const json* residuals = plot_titled(data, "gauge: residuals");
+  ASSERT_TRUE(residuals);
+  EXPECT_FALSE(plot_titled(data, "alpha: residuals"));
+  const std::pair<const json&, std::size_t> models[] = {{before, 0}, {diagnosis["fit"], 1}};
+  for (const auto& [model, curve] : models) {
+    double sum = 0, count = 0;
+    for (const json& v : (*residuals)["series"][curve]["v"])
+      if (v.is_number()) sum += std::pow(v.get<double>(), 2), ++count;
+    for (const json& run : model["runs"])
+      if (run["file"] == wave + "step_a.csv")  // the motion is estimated again: see ShowsEveryResultOfTheChain; the wave carries on through few samples
+        EXPECT_NEAR(std::sqrt(sum / count) / run["rms_residual"].get<double>(), 1, 0.05) << curve;
+  }
 }
 
 TEST(Report, ShowsADiagnosisOfTheMandatoryFieldsAlone) {

@@ -103,15 +103,15 @@ TEST(Lengths, ThreeSamplesGetAnAnswerOrAReason) {
   EXPECT_THAT(fitted.err, ::testing::Not(HasSubstr("internal error")));
 }
 
-TEST(Lengths, AMillionSamplesFitIntoAQuarterOfAGigabyte) {
+TEST(Lengths, AMillionSamplesFitIntoASixthOfAGigabyte) {
   const TemporaryDirectory directory;
   const std::string run = directory.file("run.csv", step_run(1'000'000)), out = directory.path("out.csv");
   const Finished finished = run_unrig(directory, {"simulate", "--rig", null_campaign("rig.toml"), "--run", run, "-o", out});
   ASSERT_EQ(finished.status, 0) << finished.err;
   EXPECT_GT(std::filesystem::file_size(out), 20'000'000u);
 #ifdef NDEBUG  // the sanitizers need memory of their own
-  // 46 MB of text written and 15 MB read, five columns of a million doubles, and copies of them: 172 MB measured.
-  EXPECT_LT(finished.peak_memory, 256 * 1024);
+  // 15 MB of text read, five columns of a million doubles, and copies of them: 127 MB measured. The 46 MB of text written are not among them.
+  EXPECT_LT(finished.peak_memory, 160 * 1024);
 #endif
 }
 

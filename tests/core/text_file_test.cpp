@@ -7,6 +7,7 @@
 #include <unistd.h>
 
 #include <filesystem>
+#include <stdexcept>
 #include <string>
 #include <thread>
 
@@ -43,6 +44,44 @@ TEST(TextFile, WritesWhatItReads) {
   EXPECT_EQ(read_text(directory.path("a.txt")), text);
   write_text(directory.path("a.txt"), "");
   EXPECT_EQ(read_text(directory.path("a.txt")), "");
+}
+
+TEST(TextFile, PiecesBecomeOneTextWhateverTheirSize) {
+  const TemporaryDirectory directory;
+  const std::string path = directory.path("pieces.txt");
+  std::string whole;
+  const TextSource source = [&](const TextSink& sink) {
+    whole.clear();
+    for (int k = 0; k < 3000; ++k) {  // small ones gather, one larger than any buffer goes through, in their order
+      const std::string piece = std::to_string(k) + std::string(k == 1500 ? 1 << 20 : static_cast<std::size_t>(k % 200), 'x');
+      sink(piece);
+      whole += piece;
+    }
+  };
+  write_text(path, source);
+  EXPECT_EQ(read_text(path), whole);
+  EXPECT_EQ(whole_text(source), whole);
+}
+
+TEST(TextFile, ASourceThatThrowsHalfwayLeavesTheOldFile) {
+  const TemporaryDirectory directory;
+  const std::string path = directory.file("run.csv", "old");
+  const auto fails = [&](const TextSink& sink) {
+    sink(std::string(1 << 20, 'x'));
+    throw std::runtime_error("no more");
+  };
+  EXPECT_THROW(write_text(path, fails), std::runtime_error);
+  EXPECT_EQ(read_text(path), "old");
+  EXPECT_EQ(files_in(directory.path("")), 1u);
+}
+
+TEST(TextFile, ASourceIsNotAskedForMoreThanTheDeviceTakes) {
+  if (!fs::exists("/dev/full")) GTEST_SKIP() << "the system has no /dev/full";
+  int asked = 0;
+  EXPECT_THROW(write_text("/dev/full", [&](const TextSink& sink) {
+    for (; asked < 1000; ++asked) sink(std::string(1 << 17, 'x'));
+  }), InputError);
+  EXPECT_EQ(asked, 0) << "the first piece already finds it full";
 }
 
 TEST(TextFile, ReadingWhatIsNotThereNamesPathAndReason) {

@@ -1,0 +1,48 @@
+// Progress: on a terminal one line that comes and goes, nothing in pipes. `script` lends the terminal.
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cstdlib>
+
+#include "core/text_file.h"
+#include "tests/commands/run_unrig.h"
+#include "tests/support/sample_data.h"
+
+namespace unrig {
+namespace {
+
+using test::null_campaign;
+using test::TemporaryDirectory;
+using ::testing::HasSubstr;
+using ::testing::Not;
+
+TEST(Progress, IsSeenOnATerminalAndGoneAtTheEnd) {
+  if (std::system("command -v script >/dev/null 2>&1") != 0) GTEST_SKIP() << "no `script` on this machine (Debian: bsdutils)";
+  const TemporaryDirectory directory;
+  const std::string rig = null_campaign("rig.toml"), step = null_campaign("step_a.csv"), fit = directory.path("fit.json"), corrected = directory.path("corrected.csv");
+  const std::string erase = "\r\033[K";
+  const auto on_a_terminal = [&](const std::string& arguments) {
+    const std::string seen = directory.path("seen");
+    EXPECT_EQ(std::system(("script -qec '" UNRIG_BINARY " " + arguments + "' /dev/null >" + seen + " 2>&1 </dev/null").c_str()), 0) << read_text(seen);
+    return read_text(seen);
+  };
+  const std::vector<std::string> commands{"fit --rig " + rig + " " + null_campaign("dry_pluck.csv") + " " + step + " -o " + fit,
+                                          "correct --rig " + rig + " --fit " + fit + " " + step + " -o " + corrected,
+                                          "simulate --rig " + rig + " --run " + step + " -o " + directory.path("simulated.csv"),
+                                          "report " + fit + " " + corrected + " -o " + directory.path("report.html")};
+  for (const std::string& command : commands) {
+    const std::string seen = on_a_terminal(command);
+    const std::size_t shown = seen.rfind(" ...");
+    ASSERT_NE(shown, std::string::npos) << command << " shows nothing:\n" << seen;
+    EXPECT_EQ(seen.substr(shown + 4, erase.size()), erase) << command;
+    // Piped, the same command says nothing of it.
+    const std::string err = directory.path("err");
+    ASSERT_EQ(std::system((UNRIG_BINARY " " + command + " >/dev/null 2>" + err).c_str()), 0);
+    EXPECT_THAT(read_text(err), Not(HasSubstr(" ..."))) << command;
+    EXPECT_THAT(read_text(err), Not(HasSubstr("\033"))) << command;
+  }
+}
+
+}  // namespace
+}  // namespace unrig
