@@ -2,11 +2,11 @@
 # Every test under AddressSanitizer (with LeakSanitizer) and UBSan; the first finding of either ends the test that met it.
 #
 #   sh tests/sanitize.sh            the whole suite
-#   sh tests/sanitize.sh core       one floor of tests/, building no more than that needs: core, fit, correct, verification, commands. .ci/run does this with core
+#   sh tests/sanitize.sh core       one floor of tests/, building no more than that needs: core, fit, correct, verification, commands.
 #   sh tests/sanitize.sh REGEX      the tests whose names match, as `ctest -R` takes it
 #
-# Files are compiled ten at a time (CMakeLists.txt says what else makes this build cheap). A file whose helpers are named like another's can stay
-# out of that: SKIP_UNITY_BUILD_INCLUSION in tests/CMakeLists.txt.
+# `cmake build/sanitize -DCMAKE_UNITY_BUILD=ON` compiles ten files as one, which may save much; that build has not been taken to its end yet. A file whose
+# helpers are named like another's stays out of it by SKIP_UNITY_BUILD_INCLUSION.
 #
 # 2026-11-22: the 289 tests of core passed, in 68 s one after the other, with no finding. The other floors, commands and studies have not been run yet.
 #

@@ -167,9 +167,11 @@ TEST(Report, ADiagnosisShowsItsRecordingsAndBothModels) {
     double sum = 0, count = 0;
     for (const json& v : (*residuals)["series"][curve]["v"])
       if (v.is_number()) sum += std::pow(v.get<double>(), 2), ++count;
-    for (const json& run : model["runs"])
-      if (run["file"] == wave + "step_a.csv")  // the motion is estimated again: see ShowsEveryResultOfTheChain; the wave carries on through few samples
-        EXPECT_NEAR(std::sqrt(sum / count) / run["rms_residual"].get<double>(), 1, 0.05) << curve;
+    for (const json& run : model["runs"]) {
+      if (run["file"] != wave + "step_a.csv") continue;
+      // The motion is estimated again: see ShowsEveryResultOfTheChain; within 5 % the two models (a factor of eight apart) cannot be taken for one another.
+      EXPECT_NEAR(std::sqrt(sum / count) / run["rms_residual"].get<double>(), 1, 0.05) << curve;
+    }
   }
 }
 
