@@ -24,8 +24,6 @@ using ::testing::HasSubstr;
 
 const std::vector<std::string> all_runs{"dry_pluck", "wet_pluck", "step_a", "step_b", "step_c"};
 
-std::string base_name(const std::string& path) { return path.substr(path.rfind('/') + 1); }
-
 /// KEY.json's answer for a parameter of the sample campaign.
 double truth_of(const FittedParameter& p) {
   static const json key = json::parse(read_text(test::source_path("sample_data/campaigns/KEY.json")))["null"];
