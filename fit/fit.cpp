@@ -7,17 +7,49 @@
 #include <fmt/format.h>
 
 #include "fit/arrival.h"
+#include "fit/decays_first.h"
 #include "fit/diagnose/search.h"
 #include "fit/fit_description.h"
+#include "fit/gauss_newton.h"
 #include "fit/uncertainty.h"
 #include "fit/undetermined.h"
 
 namespace unrig {
 namespace {
 
+bool follows_smooth_laws(const JointProblem& joint) {
+  const auto bends = [&](std::size_t r) { return joint.runs()[r].largest_arguments(joint.theta(r)).size() > 0; };
+  for (std::size_t r = 0; r < joint.runs().size(); ++r)
+    if (bends(r)) return !takes_small_steps(joint);  // those have been chosen for their corners
+  return false;
+}
+
+/// Of the next Gauss-Newton step of all unknowns together, in standard errors.
+double step_left(const JointProblem& joint) {
+  const LeastSquaresProblem squares = joint.least_squares();
+  return standing(squares, linearise(squares, squares.values())).step_left;
+}
+
+/// Halves the steps in which nonlinear laws are followed until half of them would move the unknowns by less than a third of a standard error, all together. The error
+/// of a law goes with the square of the step (core/nonlinear_response.h): three quarters of it show, and at most four ninths of a standard error are left.
+void settle_steps(Arrival& arrival) {
+  if (!follows_smooth_laws(arrival.joint)) return;
+  constexpr Eigen::Index most = 8;
+  constexpr double hardly = 1.0 / 3;
+  const auto follow_in = [&](Eigen::Index times) {
+    for (RunResidual& run : arrival.joint.runs()) run.follow_in(times);
+  };
+  for (Eigen::Index times = 1; times < most; times *= 2) {
+    follow_in(2 * times);
+    if (step_left(arrival.joint) < hardly) return follow_in(times);
+    solve(arrival);
+  }
+}
+
 /// Noise, motion, and what the data cannot determine: each looked at again once the model fits.
 ParameterUncertainty settle(Arrival& arrival, const FitProblem& problem) {
   refine(arrival, problem);
+  settle_steps(arrival);
   ParameterUncertainty uncertainty = estimate_uncertainty(arrival.joint);
   constexpr int rounds = 3;  // what was a line of the noise may turn out to be nothing at all once its damping is held
   for (int round = 0; round < rounds && hold_weak(arrival.joint, uncertainty, problem.start); ++round) {

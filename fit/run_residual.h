@@ -160,6 +160,13 @@ class RunResidual {
   /// A glance at a nonlinear run: c in two steps, and the model in one step a sample whatever its laws ask for. Enough to compare starts and candidates.
   void glance(bool only) { glance_ = only; }
 
+  /// Follows nonlinear laws in so many times the steps that they ask for.
+  void follow_in(Eigen::Index times) {
+    finer_ = times;
+    forget_solutions();
+  }
+  Eigen::Index finer() const { return finer_; }
+
   /// Moves c of a nonlinear run with prescribed motion to the least chi-square that exact tangents reach over a record that grows, at theta. For laws with corners that
   /// the rig crosses all the time (freeplay), or that it leaves and meets again (friction). False, and nothing done, where the model is linear.
   bool find_linear(const Eigen::VectorXd& theta);
@@ -252,6 +259,7 @@ class RunResidual {
   mutable Guide guide_;
   double linear_precision_ = 3e-3;
   bool glance_ = false;
+  Eigen::Index finer_ = 1;
 
   // Layout of c.
   std::vector<Eigen::Index> free_;  ///< states whose initial value is unknown

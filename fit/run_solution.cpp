@@ -251,7 +251,7 @@ LinearSystem RunResidual::searched_system(const VectorXd& theta) const {
   LinearSystem system = model_->system(conditions_, theta, channels_);
   for (Feedback& f : system.feedback) {
     if (f.rounded) f.law = f.rounded;
-    if (glance_) f.steps_per_sample = 1;
+    f.steps_per_sample = glance_ ? 1 : finer_ * f.steps_per_sample;
   }
   return system;
 }

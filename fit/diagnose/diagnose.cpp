@@ -183,8 +183,8 @@ bool is_idle(const JointProblem& joint, const std::string& id) {
   return false;
 }
 
-/// The effects of the best set, and the sets that are as good.
-void name_missing(const Trial& baseline, const Trial& best, Diagnosis& d) {
+/// The effects of the best set, and the sets of `tried` that are as good.
+void name_missing(const Trial& baseline, const Trial& best, const Trials& tried, bool verdict_only, Diagnosis& d) {
   for (const std::string& id : best.effects) {
     if (is_idle(best.arrival.joint, id)) continue;
     const Effect& e = effect(id);
@@ -196,9 +196,11 @@ void name_missing(const Trial& baseline, const Trial& best, Diagnosis& d) {
     d.missing.push_back(m);
   }
   const double best_bic = bic_difference(best, baseline);
-  for (const Candidate& c : d.ranking) {
-    const bool other = c.effects != best.effects && !c.effects.empty() && c.effects.size() <= best.effects.size();
-    if (other && c.delta_bic - best_bic < decisive) d.equivalent.push_back(c.effects);
+  for (const Trial& t : tried) {
+    const bool other = t.effects != best.effects && t.effects.size() <= best.effects.size();
+    if (!other || bic_difference(t, baseline) - best_bic >= decisive) continue;
+    d.equivalent.push_back(t.effects);
+    d.separated_by.push_back(verdict_only ? std::nullopt : separating_recording(best.arrival, t.arrival));
   }
 }
 
@@ -222,13 +224,15 @@ Diagnosis diagnose(const DiagnoseProblem& problem) {
   d.ranking.push_back({{}, baseline.reduced_chi2(), 0, 0, 0});
 
   Trial best = baseline;
+  Trials all_tried;
   while (best.effects.size() < most_effects && !decays_decide(best) && (best.effects.empty() ? d.mismatch.found : best.reduced_chi2() > explained && locate_mismatch(best.arrival.joint).found)) {
     tell(best.effects.empty() ? "trying what may be missing" : "trying what may be missing beside " + best.effects.back());
-    const Trials tried = try_one_more(problem, fit_problem, best);
+    Trials tried = try_one_more(problem, fit_problem, best);
     for (const Trial& t : tried) d.ranking.push_back({t.effects, t.reduced_chi2(), bic_difference(t, baseline), 0, best.effects.empty() ? t.score : 0});
     if (tried.empty() || bic_difference(tried.front(), best) > -decisive) break;
     if (!leaves_nothing(tried.front()) && excess(tried.front()) > hardly_less * excess(best)) break;
     best = without_superfluous(fit_problem, tried.front());
+    std::move(tried.begin(), tried.end(), std::back_inserter(all_tried));
   }
   give_probabilities(d.ranking);
   std::sort(d.ranking.begin(), d.ranking.end(), [](const Candidate& a, const Candidate& b) { return a.delta_bic < b.delta_bic; });
@@ -247,7 +251,7 @@ Diagnosis diagnose(const DiagnoseProblem& problem) {
     for (const ImprovedRun& run : unseen) d.runs.push_back(run);
     if (d.unexplained) d.missing_force = missing_forces(best.arrival.joint);
   }
-  if (named) name_missing(baseline, best, d);
+  if (named) name_missing(baseline, best, all_tried, problem.verdict_only, d);
   d.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
   return d;
 }

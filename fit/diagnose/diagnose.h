@@ -10,6 +10,7 @@
 #include "fit/diagnose/maps.h"
 #include "fit/diagnose/mismatch.h"
 #include "fit/diagnose/missing_force.h"
+#include "fit/diagnose/separating.h"
 #include "fit/fit.h"
 
 namespace unrig {
@@ -53,6 +54,7 @@ struct Diagnosis {
   Mismatch mismatch;                   ///< of the best fit with nothing missing
   std::vector<MissingEffect> missing;  ///< the winner
   std::vector<std::vector<std::string>> equivalent;  ///< sets that these runs cannot tell from the winner
+  std::vector<std::optional<SeparatingRecording>> separated_by;  ///< and the recording that would, for each of them
   bool unexplained = false;            ///< a significant mismatch remains
   Mismatch remaining;                  ///< and where it sits
   double bic_before = 0, bic_after = 0;

@@ -19,7 +19,9 @@ ordered_json number(double x) { return std::isfinite(x) ? ordered_json(x) : orde
 ordered_json mismatch_json(const Mismatch& m) {
   ordered_json channels = ordered_json::array();
   for (const ChannelMismatch& c : m.channels) channels.push_back({{"run", c.run}, {"channel", c.channel}, {"power_over_noise", number(c.energy)}, {"p_value", number(c.p_value)}});
-  return {{"found", m.found}, {"p_value", number(m.p_value)}, {"runs", m.runs}, {"time", m.time}, {"frequency", m.frequency}, {"summary", m.summary}, {"channels", channels}};
+  ordered_json states = ordered_json::array();
+  for (const std::optional<StateDependence>& s : m.state) states.push_back(s ? ordered_json{{"state", s->state}, {"share", number(s->share)}, {"standard_deviation", number(s->standard)}, {"correlation", number(s->follows)}} : ordered_json(nullptr));
+  return {{"found", m.found}, {"p_value", number(m.p_value)}, {"runs", m.runs}, {"time", m.time}, {"frequency", m.frequency}, {"depends_on", states}, {"summary", m.summary}, {"channels", channels}};
 }
 
 /// Four digits: maps are to look at. NaN becomes null.
@@ -45,6 +47,12 @@ ordered_json map_json(const ResidualMaps& m) {
 }
 
 std::string set_name(const std::vector<std::string>& effects) { return effects.empty() ? "nothing missing" : fmt::format("{}", fmt::join(effects, " + ")); }
+
+std::string cannot_tell(const std::vector<std::string>& set, const std::optional<SeparatingRecording>& by) {
+  std::string text = "These runs cannot tell it from " + set_name(set) + ". ";
+  if (!by) return text + "No simple variation of these runs would.";
+  return text + fmt::format("A recording that would: {} (the two would differ by {:.2g} times the noise; in the run as recorded, by {:.2g}).", by->what, by->difference, by->now);
+}
 
 std::string verdict(const Diagnosis& d) {
   if (!d.mismatch.found) return "Nothing is missing: " + d.mismatch.summary + ".";
@@ -85,11 +93,15 @@ std::string to_json(const Diagnosis& d) {
     for (const FittedParameter& a : d.after.parameters)
       if (!d.after.effects.empty() && a.name == b.name && a.run == b.run && a.identified)
         shifts.push_back({{"name", a.name}, {"run", a.run}, {"without", number(b.value)}, {"with", number(a.value)}, {"std_error", number(a.std_error)}, {"unit", a.unit}});
+  ordered_json separated = ordered_json::array();
+  for (const std::optional<SeparatingRecording>& s : d.separated_by)
+    separated.push_back(s ? ordered_json{{"recording", s->what}, {"difference_over_noise", number(s->difference)}, {"as_recorded", number(s->now)}} : ordered_json(nullptr));
   const ordered_json json = {{"unrig", "diagnosis"},
                              {"verdict", verdict(d)},
                              {"mismatch", mismatch_json(d.mismatch)},
                              {"missing", missing},
                              {"equivalent", d.equivalent},
+                             {"separated_by", separated},
                              {"unexplained", d.unexplained},
                              {"remaining", mismatch_json(d.remaining)},
                              {"improvement", {{"bic_before", number(d.bic_before)}, {"bic_after", number(d.bic_after)}, {"runs", runs}}},
@@ -108,7 +120,7 @@ std::string report(const Diagnosis& d) {
     for (const FittedParameter& p : m.parameters)
       text += fmt::format("    {} = {:.6g} +/- {:.2g} {}{}\n", p.name, p.value, p.std_error, p.unit, p.run.empty() ? "" : " (" + base_name(p.run) + ")");
   }
-  for (const auto& set : d.equivalent) text += "    These runs cannot tell it from " + set_name(set) + ".\n";
+  for (std::size_t i = 0; i < d.equivalent.size(); ++i) text += "    " + cannot_tell(d.equivalent[i], d.separated_by[i]) + "\n";
   if (d.unexplained) text += "[[Unexplained]]\n    " + d.remaining.summary + "\n";
   for (const MissingForce& f : d.missing_force)
     text += fmt::format("    what is left of {} would be explained by a force of {:.3g} N r.m.s. at the calibration element, known to {:.2g} N (diagnosis file: missing_force)\n",

@@ -25,6 +25,7 @@ HeldoutResidual predict_heldout(const Arrival& arrival, const FitProblem& proble
   options.precision = 0.1;  // what is predicted moves by less than its own noise
   options.most_evaluations = 15;
   RunResidual& residual = joint.runs().front();
+  residual.follow_in(arrival.joint.runs().front().finer());
   residual.find_linear(joint.theta(0));
   joint.solve(options);
   residual.reject_spikes(joint.theta(0));

@@ -3,17 +3,15 @@
 #include <algorithm>
 #include <cmath>
 
-#include "core/effects/effect.h"
-#include "core/run_inputs.h"
 #include "core/spectrum.h"
 #include "fit/diagnose/mismatch.h"
+#include "fit/diagnose/run_states.h"
 
 namespace unrig {
 namespace {
 
 using Eigen::Index;
 using Eigen::MatrixXd;
-using Eigen::RowVectorXd;
 using Eigen::VectorXd;
 
 /// Means of x over `groups` stretches of about equal length.
@@ -27,24 +25,12 @@ VectorXd grouped(const VectorXd& x, Index groups) {
   return mean;
 }
 
-/// Displacement and velocity of the first mode in a run, from the motion, the start and the inputs that the fit found.
-MatrixXd mode_motion(const RunResidual& run, const RunResidual::Prediction& p, const VectorXd& theta) {
-  LinearSystem system = run.model().system(run.conditions(), theta, {});
-  const RowVectorXd shape = first_mode(run.model(), system.coordinates);
-  MatrixXd reads(2, system.states());
-  reads << displacement_of(system, shape), rate_of(system, shape);
-  system.C = DualMatrix(reads, theta.size());
-  system.D = DualMatrix(MatrixXd::Zero(2, system.B.cols()), theta.size());
-  MatrixXd start = MatrixXd::Zero(system.states(), 1);
-  start.col(0).head(std::min(p.initial_state.size(), system.free_states())) = p.initial_state.head(std::min(p.initial_state.size(), system.free_states()));
-  return drive(system, exact_step(system, run.run().dt), DualMatrix(start, theta.size()), run.run().samples(), p.motion.jerk, run_inputs(run.run(), run.conditions()), Partials::none).output;
-}
-
 RestoringForceMap force_map(const RunResidual& run, const RunResidual::Prediction& p, const VectorXd& theta, const VectorXd& residual) {
   const Rig& rig = run.model().rig();
   const std::string unit = rig.is_modal() && !rig.modal.front().gauge_unit.empty() ? rig.modal.front().gauge_unit : "m";
-  const MatrixXd motion = mode_motion(run, p, theta) * (unit == "m" ? 1 : rig.modal.front().gauge_gain);
-  RestoringForceMap map = restoring_force(motion.col(0), motion.col(1), residual);
+  const std::vector<RunState> states = run_states(run, p, theta);
+  const double gain = unit == "m" ? 1 : rig.modal.front().gauge_gain;
+  RestoringForceMap map = restoring_force(states[0].value * gain, states[1].value * gain, residual);
   map.displacement_unit = unit;
   map.velocity_unit = unit + "/s";
   map.force_unit = run.run().channel(p.channels[0]).unit;
