@@ -71,6 +71,7 @@ double promised_share(const JointProblem& joint, double before) {
   std::vector<Index> free;
   for (std::size_t i = 0; i < joint.unknowns().size(); ++i)
     if (!joint.unknowns()[i].held && lin.jacobian.col(static_cast<Index>(i)).norm() > 0) free.push_back(static_cast<Index>(i));
+  if (free.empty() || !lin.residual.allFinite()) return -INFINITY;  // the model runs away from where it would start
   MatrixXd j = lin.jacobian(Eigen::all, free);
   for (Index k = 0; k < j.cols(); ++k) j.col(k).normalize();
   const Eigen::ColPivHouseholderQR<MatrixXd> qr(j);
