@@ -47,9 +47,9 @@ void settle_steps(Arrival& arrival) {
 }
 
 /// Noise, motion, and what the data cannot determine: each looked at again once the model fits.
-ParameterUncertainty settle(Arrival& arrival, const FitProblem& problem) {
+ParameterUncertainty settle(Arrival& arrival, const FitProblem& problem, bool steps) {
   refine(arrival, problem);
-  settle_steps(arrival);
+  if (steps) settle_steps(arrival);
   ParameterUncertainty uncertainty = estimate_uncertainty(arrival.joint);
   constexpr int rounds = 3;  // what was a line of the noise may turn out to be nothing at all once its damping is held
   for (int round = 0; round < rounds && hold_weak(arrival.joint, uncertainty, problem.start); ++round) {
@@ -97,7 +97,7 @@ AeroelasticModel model_of(const Rig& rig, const std::vector<Run>& runs, Wagner c
   return complete({rig, basis, wagner(circulation)});
 }
 
-FitResult describe_fit(Arrival& arrival, const FitProblem& problem, bool settled) {
+FitResult describe_fit(Arrival& arrival, const FitProblem& problem, Settle first) {
   FitResult result;
   result.rig_file = problem.rig.file;
   result.circulation = problem.circulation;
@@ -105,7 +105,7 @@ FitResult describe_fit(Arrival& arrival, const FitProblem& problem, bool settled
   result.warnings = problem.rig.warnings;
   for (const Run& run : problem.runs) result.warnings.insert(result.warnings.end(), run.warnings.begin(), run.warnings.end());
   for (RunResidual& run : arrival.joint.runs()) run.temper(1);
-  const ParameterUncertainty uncertainty = settled ? estimate_uncertainty(arrival.joint) : settle(arrival, problem);
+  const ParameterUncertainty uncertainty = first == Settle::nothing ? estimate_uncertainty(arrival.joint) : settle(arrival, problem, first == Settle::steps);
   result.normal_modes = arrival.model->basis().normal_modes;
   result.torsion_modes = arrival.model->basis().torsion_modes;
   result.evaluations = arrival.evaluations;
@@ -134,7 +134,7 @@ FitResult fit(const FitProblem& problem) {
   check_names(*model, problem);
   Arrival arrival = problem.effects.empty() ? arrive(problem, model) : arrive_at_effects(problem);
   check_lengths(arrival);
-  FitResult result = describe_fit(arrival, problem);
+  FitResult result = describe_fit(arrival, problem, Settle::steps);
   result.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
   return result;
 }

@@ -8,8 +8,12 @@ namespace unrig {
 
 /// What a finished fit says of itself.
 
-/// All of it. `settled` is false where noise levels, spikes and the motion's windows should first be looked at again, and what the data cannot determine be held.
-FitResult describe_fit(Arrival& arrival, const FitProblem& problem, bool settled = false);
+/// What is to be done before: nothing; noise levels, spikes and the motion's windows looked at again, and what the data cannot determine held; and the steps in which
+/// nonlinear laws are followed halved until that moves nothing, which takes several times as long.
+enum class Settle { nothing, noise, steps };
+
+/// All of it.
+FitResult describe_fit(Arrival& arrival, const FitProblem& problem, Settle first);
 
 FittedRun describe_run(const RunResidual& residual, const Eigen::VectorXd& theta, double chi2);
 

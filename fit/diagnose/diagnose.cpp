@@ -72,6 +72,15 @@ void fit_anew(const FitProblem& problem, Trials& trials) {
   });
 }
 
+/// And for the others: among fits that all are far from the data, which is ahead says little.
+void fit_others_anew(const FitProblem& problem, Trials& trials) {
+  if (trials.size() <= most_in_full) return;
+  in_parallel(trials.size() - most_in_full, [&](std::size_t i) {
+    Trial& trial = trials[most_in_full + i];
+    if (!effect(trial.effects.back()).parameters.empty()) fit_from_first_guesses(problem, trial);
+  });
+}
+
 /// The best of all sets that have one effect more than `base`: all of them by one linear step, the promising ones in full.
 Trials try_one_more(const DiagnoseProblem& problem, const FitProblem& fit_problem, const Trial& base) {
   const Strings ids = candidates(problem, base.arrival.joint, base.effects);
@@ -106,6 +115,7 @@ Trials try_one_more(const DiagnoseProblem& problem, const FitProblem& fit_proble
     if (!done && !favours_linear) fit_anew(fit_problem, linear);
     const bool decays_have_told = has_decays(base.arrival.joint);  // from first guesses nonlinear laws are not found where their decays do not lead
     if (!done && !decays_have_told && !any_leaves_nothing(linear)) fit_anew(fit_problem, others);
+    if (!done && !any_leaves_nothing(linear) && !any_leaves_nothing(others) && base.reduced_chi2() > nearly_explained) fit_others_anew(fit_problem, linear);
     std::move(others.begin(), others.end(), std::back_inserter(linear));
     if (!any_leaves_nothing(linear)) {  // far from the truth one linear step promises little of what there is
       fit_anew(fit_problem, unpromising);
@@ -116,9 +126,9 @@ Trials try_one_more(const DiagnoseProblem& problem, const FitProblem& fit_proble
   return linear;
 }
 
-/// Takes away again what the others made superfluous.
+/// Takes away again what the others made superfluous; the last one too: by way of it the others may have come to a minimum that they had missed.
 Trial without_superfluous(const FitProblem& fit_problem, Trial trial) {
-  for (std::size_t k = 0; trial.effects.size() > 1 && k + 1 < trial.effects.size();) {
+  for (std::size_t k = 0; trial.effects.size() > 1 && k < trial.effects.size();) {
     Strings fewer = trial.effects;
     fewer.erase(fewer.begin() + static_cast<std::ptrdiff_t>(k));
     Trial smaller = prepare(fit_problem, trial, fewer);
@@ -167,8 +177,8 @@ void describe(const DiagnoseProblem& problem, const FitProblem& fit_problem, con
   FitProblem after = fit_problem;
   after.effects = best.effects;
   Arrival before_arrival = baseline.arrival, after_arrival = best.arrival;
-  d.before = describe_fit(before_arrival, fit_problem, d.mismatch.found);  // a fit that explains nothing deserves no refinement
-  d.after = best.effects.empty() ? d.before : describe_fit(after_arrival, after);
+  d.before = describe_fit(before_arrival, fit_problem, d.mismatch.found ? Settle::nothing : Settle::noise);  // a fit that explains nothing deserves no refinement
+  d.after = best.effects.empty() ? d.before : describe_fit(after_arrival, after, Settle::noise);
   d.bic_after = bic_difference(best, baseline) + (d.bic_before = d.before.bic());
   for (std::size_t r = 0; r < problem.runs.size(); ++r) {
     const FittedChannel &b = d.before.runs[r].channels.front(), &a = d.after.runs[r].channels.front();
