@@ -115,7 +115,7 @@ Trials try_one_more(const DiagnoseProblem& problem, const FitProblem& fit_proble
     if (!done && !favours_linear) fit_anew(fit_problem, linear);
     const bool decays_have_told = has_decays(base.arrival.joint);  // from first guesses nonlinear laws are not found where their decays do not lead
     if (!done && !decays_have_told && !any_leaves_nothing(linear)) fit_anew(fit_problem, others);
-    if (!done && !any_leaves_nothing(linear) && !any_leaves_nothing(others) && base.reduced_chi2() > nearly_explained) fit_others_anew(fit_problem, linear);
+    if (!done && !any_leaves_nothing(linear) && !any_leaves_nothing(others) && base.effects.empty() && base.reduced_chi2() > nearly_explained) fit_others_anew(fit_problem, linear);
     std::move(others.begin(), others.end(), std::back_inserter(linear));
     if (!any_leaves_nothing(linear)) {  // far from the truth one linear step promises little of what there is
       fit_anew(fit_problem, unpromising);
