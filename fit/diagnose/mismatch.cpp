@@ -2,11 +2,11 @@
 
 #include <algorithm>
 #include <cmath>
-#include <filesystem>
 
 #include <fmt/format.h>
 
 #include "core/spectrum.h"
+#include "core/text_file.h"
 #include "fit/coloured_noise.h"
 
 namespace unrig {
@@ -49,8 +49,6 @@ VectorXd smoothed(const VectorXd& x, Index half) {
   return out;
 }
 
-std::string name_of(const std::string& path) { return std::filesystem::path(path).filename().string(); }
-
 bool is_linear(const RunResidual& run, const VectorXd& theta) { return run.model().system(run.conditions(), theta, run.channels()).feedback.empty(); }
 
 /// "growing with the motion": how the r.m.s. of the excess goes with that of the gauge's own swing from run to run, where three or more runs tell.
@@ -77,7 +75,7 @@ std::string describe(const RunResidual& run, const VectorXd& left, Mismatch& mis
   const double f0 = static_cast<double>(band.first) * per_line, f1 = static_cast<double>(band.last) * per_line;
   mismatch.time.push_back({t0, t1});
   mismatch.frequency.push_back({f0, f1});
-  std::string text = fmt::format("{:.0f} % of the excess of {} lies between {:.3g} and {:.3g} Hz, and {:.0f} % of it between {:.3g} and {:.3g} s", 100 * most, name_of(run.run().file), f0, f1,
+  std::string text = fmt::format("{:.0f} % of the excess of {} lies between {:.3g} and {:.3g} Hz, and {:.0f} % of it between {:.3g} and {:.3g} s", 100 * most, base_name(run.run().file), f0, f1,
                                  100 * most, t0, t1);
   if (run.motion().unknowns() > 0 && run.conditions().speed > 0) {
     const double onset = run.run().time(run.motion().active().front().first), per_second = run.conditions().speed / run.model().rig().semichord();

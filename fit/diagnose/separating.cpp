@@ -2,13 +2,13 @@
 
 #include <algorithm>
 #include <cmath>
-#include <filesystem>
 #include <stdexcept>
 #include <vector>
 
 #include <fmt/format.h>
 
 #include "core/simulate.h"
+#include "core/text_file.h"
 
 namespace unrig {
 namespace {
@@ -49,7 +49,7 @@ std::vector<Variation> variations(const Arrival& arrival, std::size_t r) {
   constexpr double water = 998.2, air = 1.2, between = 100;
   const RunResidual& residual = arrival.joint.runs()[r];
   const Run& run = residual.run();
-  const std::string name = std::filesystem::path(run.file).filename().string();
+  const std::string name = base_name(run.file);
   std::vector<Variation> all;
   if (run.kind == RunKind::pluck) {
     const double load = release_load_of(arrival, r);
