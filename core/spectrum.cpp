@@ -28,50 +28,58 @@ struct FftwFree {
   void operator()(T* memory) const { fftw_free(memory); }
 };
 
-/// Arrays and plan of one transform of a given length.
-class RealTransform {
- public:
-  explicit RealTransform(Index length)
-      : in_(fftw_alloc_real(static_cast<std::size_t>(length))), out_(fftw_alloc_complex(static_cast<std::size_t>(length / 2 + 1))) {
-    if (!in_ || !out_) throw std::bad_alloc();
-    const std::lock_guard lock(planner());
-    plan_ = fftw_plan_dft_r2c_1d(static_cast<int>(length), in_.get(), out_.get(), FFTW_ESTIMATE);
-    if (plan_ == nullptr) throw std::runtime_error(fmt::format("FFTW has no plan for {} samples", length));
+/// As FFTW wants its memory.
+struct Buffers {
+  explicit Buffers(Index length) : real(fftw_alloc_real(static_cast<std::size_t>(length))), lines(fftw_alloc_complex(static_cast<std::size_t>(length / 2 + 1))) {
+    if (!real || !lines) throw std::bad_alloc();
   }
-  ~RealTransform() {
-    const std::lock_guard lock(planner());
-    fftw_destroy_plan(plan_);
-  }
-  RealTransform(const RealTransform&) = delete;
-  RealTransform& operator=(const RealTransform&) = delete;
-
-  double* input() { return in_.get(); }
-  const fftw_complex* execute() {
-    fftw_execute(plan_);
-    return out_.get();
-  }
-
- private:
-  std::unique_ptr<double, FftwFree<double>> in_;
-  std::unique_ptr<fftw_complex, FftwFree<fftw_complex>> out_;
-  fftw_plan plan_ = nullptr;
+  std::unique_ptr<double, FftwFree<double>> real;
+  std::unique_ptr<fftw_complex, FftwFree<fftw_complex>> lines;
 };
 
 }  // namespace
 
-VectorXcd fourier(const VectorXd& x, Index length) {
-  if (length == 0) length = x.size();
+struct FourierPlan::Plans {
+  fftw_plan forward = nullptr, inverse = nullptr;
+};
+
+FourierPlan::FourierPlan(Index length) : length_(length), plans_(std::make_unique<Plans>()) {
+  if (length < 1) throw std::invalid_argument("a transform needs at least one sample");
+  const Buffers buffers(length);
+  const std::lock_guard lock(planner());
+  plans_->forward = fftw_plan_dft_r2c_1d(static_cast<int>(length), buffers.real.get(), buffers.lines.get(), FFTW_ESTIMATE);
+  plans_->inverse = fftw_plan_dft_c2r_1d(static_cast<int>(length), buffers.lines.get(), buffers.real.get(), FFTW_ESTIMATE);
+  if (plans_->forward == nullptr || plans_->inverse == nullptr) throw std::runtime_error(fmt::format("FFTW has no plan for {} samples", length));
+}
+
+FourierPlan::~FourierPlan() {
+  const std::lock_guard lock(planner());
+  fftw_destroy_plan(plans_->forward);
+  fftw_destroy_plan(plans_->inverse);
+}
+
+VectorXcd FourierPlan::forward(const VectorXd& x) const {
   if (x.size() == 0) throw std::invalid_argument("a transform needs at least one sample");
-  if (length < x.size()) throw std::invalid_argument(fmt::format("a transform of {} samples was asked for, of a record of {}", length, x.size()));
+  if (length_ < x.size()) throw std::invalid_argument(fmt::format("a transform of {} samples was asked for, of a record of {}", length_, x.size()));
   if (!x.allFinite()) throw std::invalid_argument("a transform needs finite samples");
-  RealTransform transform(length);
-  std::copy_n(x.data(), x.size(), transform.input());
-  std::fill(transform.input() + x.size(), transform.input() + length, 0.0);
-  const fftw_complex* lines = transform.execute();
-  VectorXcd result(length / 2 + 1);
-  for (Index k = 0; k < result.size(); ++k) result[k] = {lines[k][0], lines[k][1]};
+  const Buffers buffers(length_);
+  std::copy_n(x.data(), x.size(), buffers.real.get());
+  std::fill(buffers.real.get() + x.size(), buffers.real.get() + length_, 0.0);
+  fftw_execute_dft_r2c(plans_->forward, buffers.real.get(), buffers.lines.get());
+  VectorXcd result(length_ / 2 + 1);
+  for (Index k = 0; k < result.size(); ++k) result[k] = {buffers.lines.get()[k][0], buffers.lines.get()[k][1]};
   return result;
 }
+
+VectorXd FourierPlan::inverse(const VectorXcd& lines) const {
+  if (lines.size() != length_ / 2 + 1) throw std::invalid_argument(fmt::format("a record of {} samples has {} lines, not {}", length_, length_ / 2 + 1, lines.size()));
+  const Buffers buffers(length_);
+  for (Index k = 0; k < lines.size(); ++k) buffers.lines.get()[k][0] = lines[k].real(), buffers.lines.get()[k][1] = lines[k].imag();
+  fftw_execute_dft_c2r(plans_->inverse, buffers.lines.get(), buffers.real.get());
+  return Eigen::Map<const VectorXd>(buffers.real.get(), length_) / static_cast<double>(length_);
+}
+
+VectorXcd fourier(const VectorXd& x, Index length) { return FourierPlan(length == 0 ? x.size() : length).forward(x); }
 
 VectorXd window_weights(Window window, Index samples) {
   if (window == Window::rectangular) return VectorXd::Ones(samples);

@@ -1,5 +1,6 @@
 #pragma once
 #include <Eigen/Core>
+#include <memory>
 #include <vector>
 
 namespace unrig {
@@ -12,6 +13,25 @@ namespace unrig {
 /// Throws std::invalid_argument for an empty record, a sample that is not finite, or a `length` shorter than the record.
 /// Safe to call from several threads at once. Source: M. Frigo and S. G. Johnson, Proc. IEEE 93 (2005) 216.
 Eigen::VectorXcd fourier(const Eigen::VectorXd& x, Eigen::Index length = 0);
+
+/// The same for many records: what FFTW prepares for a length is kept.
+class FourierPlan {
+ public:
+  explicit FourierPlan(Eigen::Index length);
+  ~FourierPlan();
+  FourierPlan(const FourierPlan&) = delete;
+  FourierPlan& operator=(const FourierPlan&) = delete;
+
+  Eigen::VectorXcd forward(const Eigen::VectorXd& x) const;  ///< with zeros behind x
+  /// The record of `length` samples that has the lines 0 .. floor(length / 2), scaled so that it undoes `forward`. Throws std::invalid_argument where their number does not fit.
+  Eigen::VectorXd inverse(const Eigen::VectorXcd& lines) const;
+  Eigen::Index length() const { return length_; }
+
+ private:
+  Eigen::Index length_;
+  struct Plans;
+  std::unique_ptr<Plans> plans_;
+};
 
 /// Weights on the samples before the transform (F. J. Harris, Proc. IEEE 66 (1978) 51).
 enum class Window {

@@ -10,6 +10,7 @@
 #include "core/indicial_table.h"
 #include "core/rigid_load.h"
 #include "correct/prior.h"
+#include "correct/restless_correction.h"
 #include "correct/uncertainty_budget.h"
 #include "fit/motion_prior.h"
 #include "fit/run_residual.h"
@@ -193,6 +194,31 @@ void describe_run(const CorrectProblem& problem, CorrectResult& result) {
   result.warnings = run.warnings;
 }
 
+/// Knots of the motion this far apart still hold the bands in tests/studies/CORRECT.md; the acceleration of an oscillation is off by (omega h)^2 / 12.
+constexpr Index farthest_knots = 8;  // samples
+
+/// Whether the shaft moves for so long that the fit's knots, at most 400, lie too far apart, and for most of the record.
+bool hardly_rests(const Run& run, const std::vector<MotionBasis::Window>& windows) {
+  constexpr double most = 0.5;
+  Index moving = 0;
+  for (const MotionBasis::Window& w : windows) moving += w.knots.length();
+  return windows.front().stride > farthest_knots && static_cast<double>(moving) > most * static_cast<double>(run.samples());
+}
+
+/// The settled filter is for linear rigs.
+void check_linear(const AeroelasticModel& model, const Run& run, const VectorXd& theta) {
+  if (model.system(conditions_of(run), theta, model.output_channels(run)).feedback.empty()) return;
+  throw NoAnswer(fmt::format("{}: the shaft moves nearly all the time, for longer than {} samples, and the fit names a nonlinear force. Such a motion is followed by 400 knots, which lie too far apart here: "
+                             "correct the run in parts of at most {} samples that begin at rest",
+                             run.file, farthest_knots * 400, farthest_knots * 400));
+}
+
+std::string knots_too_far_apart(const Run& run, Index stride) {
+  return fmt::format("{}: the shaft moves for so long in all that the 400 knots of its motion lie {} samples apart ({:.3g} ms). What it does faster is missing from the load, and the band is too narrow while it "
+                     "moves. Correct the run in parts in which it moves for at most {} samples.",
+                     run.file, stride, 1e3 * static_cast<double>(stride) * run.dt, farthest_knots * 400);
+}
+
 }  // namespace
 
 CorrectResult correct(const CorrectProblem& problem) {
@@ -207,11 +233,18 @@ CorrectResult correct(const CorrectProblem& problem) {
   const auto onset = static_cast<double>(moving(alpha, noise_level(alpha)).front().first);
   const double length = (static_cast<double>(run.samples()) - onset) * run.dt * result.semichords_per_second;
   const AeroelasticModel model = free_model(problem, length);
+  const VectorXd start = theta_for(model, problem.fit, run.file);
+  const Prior prior = prior_of(model, problem.fit, start, run.file);
+  if (hardly_rests(run, windows)) {
+    check_linear(model, run, start);
+    correct_restless({model, run, prior, start, length, steady_per_reading(problem.rig), problem.imposed}, result);
+    return result;
+  }
+  if (windows.front().stride > farthest_knots) result.warnings.push_back(knots_too_far_apart(run, windows.front().stride));
 
   RunResidual residual(model, run, windows);
-  const VectorXd start = theta_for(model, problem.fit, run.file);
   MatrixXd rough;
-  const Search free = estimate(residual, prior_of(model, problem.fit, start, run.file), start, rough);
+  const Search free = estimate(residual, prior, start, rough);
   const Search best = problem.imposed.any() ? constrained(residual, free, problem.imposed, response_semichords(length)) : free;
   const VectorXd& theta = best.solution.theta;
 

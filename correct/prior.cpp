@@ -146,12 +146,17 @@ VectorXd gauss_newton_step(const RunResidual::Evaluation& e, const Prior& prior,
 }
 
 Search minimise(const RunResidual& residual, Prior prior, const VectorXd& theta, double enough, bool learn) {
+  return minimise({[&](const VectorXd& at) { return residual.solve(at); }, [&](const RunResidual::Solution& solution) { return residual.differentiate(solution); }}, std::move(prior), theta,
+                  enough, learn);
+}
+
+Search minimise(const Searched& run, Prior prior, const VectorXd& theta, double enough, bool learn) {
   constexpr int most_steps = 12, most_halvings = 8;
   constexpr double settled = 0.02;  // of the logarithm of tau
-  Search search{std::move(prior), residual.solve(theta), {}, 0};
+  Search search{std::move(prior), run.solve(theta), {}, 0};
   for (int step = 0; step < most_steps; ++step) {
     const VectorXd& at = search.solution.theta;
-    search.evaluation = residual.differentiate(search.solution);
+    search.evaluation = run.differentiate(search.solution);
     double change = 0;
     if (learn) {
       const Evidence best = evidence(search.evaluation, search.prior, at);
@@ -168,7 +173,7 @@ Search minimise(const RunResidual& residual, Prior prior, const VectorXd& theta,
     bool moved = false;
     double fraction = 1;
     for (int halving = 0; halving < most_halvings && !moved; ++halving, fraction /= 2) {
-      RunResidual::Solution next = residual.solve(at + fraction * move);
+      RunResidual::Solution next = run.solve(run.advance ? run.advance(at, fraction * move) : at + fraction * move);
       moved = !allowed || cost(next.chi2, search.prior, next.theta) < now;
       if (moved) search.solution = std::move(next);
     }

@@ -1,5 +1,6 @@
 #pragma once
 #include <Eigen/Core>
+#include <functional>
 #include <optional>
 #include <string>
 #include <vector>
@@ -68,8 +69,17 @@ struct Search {
   double determined = 0;               ///< amplitudes, by the data
 };
 
+/// What a search asks of a run: the least chi-square at a theta, with all that enters linearly at its best, and its slopes there. `advance`: where a step leads that may be bent, as
+/// long as its beginning is straight; none: straight on.
+struct Searched {
+  std::function<RunResidual::Solution(const Eigen::VectorXd&)> solve;
+  std::function<RunResidual::Evaluation(const RunResidual::Solution&)> differentiate;
+  std::function<Eigen::VectorXd(const Eigen::VectorXd& theta, const Eigen::VectorXd& move)> advance = {};
+};
+
 /// Gauss-Newton with halved steps over the free parameters until the linear model promises less than `enough` of chi-square. `learn`: the weight of the
 /// regularisation follows the evidence at every step. From a theta that the prior does not allow the first step is taken whole.
+Search minimise(const Searched& run, Prior prior, const Eigen::VectorXd& theta, double enough, bool learn);
 Search minimise(const RunResidual& residual, Prior prior, const Eigen::VectorXd& theta, double enough, bool learn);
 
 }  // namespace unrig

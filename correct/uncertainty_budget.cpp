@@ -72,27 +72,41 @@ MatrixXd place(const MatrixXd& part, const std::vector<Index>& at, Index size) {
 }  // namespace
 
 UncertaintyBudget::UncertaintyBudget(const RunResidual& residual, const RunResidual::Evaluation& e, const Prior& prior, const MatrixXd& motion_prior,
-                                     double calibration_uncertainty, double inflation) {
+                                     double calibration_uncertainty, double inflation)
+    : UncertaintyBudget(
+          e, prior,
+          [&](const MatrixXd& F, const MatrixXd&) -> Shares {
+            const MatrixXd c_rows = F.bottomRows(e.linear.size()), rough = motion_prior.rows() > 0 ? MatrixXd(motion_prior * c_rows) : MatrixXd::Zero(0, F.cols());
+            return {c_rows.transpose() * angle_information(residual) * c_rows, rough.transpose() * rough};
+          },
+          [&](const MatrixXd& F, const MatrixXd& gauge) -> VectorXd {
+            VectorXd reading = VectorXd::Zero(F.cols());  // (0, c) in the coordinates of F
+            const Index unknowns = e.linear.size();
+            reading.tail(unknowns) = F.bottomRightCorner(unknowns, unknowns).colPivHouseholderQr().solve(e.linear);
+            return F * (gauge * reading);
+          },
+          calibration_uncertainty, inflation) {}
+
+UncertaintyBudget::UncertaintyBudget(const RunResidual::Evaluation& e, const Prior& prior, const SharesOf& shares, const AnswerToReading& reading, double calibration_uncertainty,
+                                     double inflation) {
   const Index parameters = e.jacobian.cols(), unknowns = e.linear.size();
   // H^-1 = F F^T over (theta, c), with c = slope theta + what is left of it at given theta.
   const MatrixXd known = prior.rows();
   MatrixXd rows(e.jacobian.rows() + known.rows(), parameters);
   rows << e.jacobian, known;
   const MatrixXd theta_root = place(inverse_root(rows(Eigen::all, prior.free)), prior.free, parameters);
-  const MatrixXd c_root = inverse_root(e.linear_factor);
   const Index thetas = theta_root.cols();
   MatrixXd F = MatrixXd::Zero(parameters + unknowns, thetas + unknowns);
   F.topLeftCorner(parameters, thetas) = theta_root;
   F.bottomLeftCorner(unknowns, thetas) = e.linear_slope * theta_root;
-  F.bottomRightCorner(unknowns, unknowns) = c_root;
+  F.bottomRightCorner(unknowns, unknowns) = inverse_root(e.linear_factor);
 
   // Shares F^T I_s F; the gauge's is what is left of the identity.
-  const MatrixXd c_rows = F.bottomRows(unknowns), angle = c_rows.transpose() * angle_information(residual) * c_rows;
   const auto share = [](const MatrixXd& a) -> MatrixXd { return a.transpose() * a; };
-  MatrixXd smoothing = share(prior.regularisation() * F.topRows(parameters));
-  if (motion_prior.rows() > 0) smoothing += share(motion_prior * c_rows);
-  const MatrixXd rig = share(prior.known * F.topRows(parameters));
-  const MatrixXd gauge = MatrixXd::Identity(F.cols(), F.cols()) - angle - smoothing - rig;
+  const MatrixXd amplitudes = share(prior.regularisation() * F.topRows(parameters)), rig = share(prior.known * F.topRows(parameters));
+  const Shares of_run = shares(F, amplitudes + rig);
+  const MatrixXd smoothing = amplitudes + of_run.roughness;
+  const MatrixXd gauge = MatrixXd::Identity(F.cols(), F.cols()) - of_run.angle - smoothing - rig;
 
   const auto root_of_share = [&](const MatrixXd& a) -> MatrixXd {
     const Eigen::SelfAdjointEigenSolver<MatrixXd> eigen(a);
@@ -100,7 +114,7 @@ UncertaintyBudget::UncertaintyBudget(const RunResidual& residual, const RunResid
   };
   const auto source = [&](Source s) -> MatrixXd& { return by_source_[static_cast<std::size_t>(s)]; };
   source(Source::gauge) = inflation * root_of_share(gauge);
-  source(Source::angle) = inflation * root_of_share(angle);
+  source(Source::angle) = inflation * root_of_share(of_run.angle);
   source(Source::regularisation) = root_of_share(smoothing);
   source(Source::rig) = root_of_share(rig);
   if (!prior.held.empty()) {
@@ -109,15 +123,19 @@ UncertaintyBudget::UncertaintyBudget(const RunResidual& residual, const RunResid
     source(Source::rig).resize(parameters + unknowns, held.cols());
     source(Source::rig) << answer, e.linear_slope * answer;
   }
-  VectorXd reading = VectorXd::Zero(F.cols());  // (0, c) in the coordinates of F
-  reading.tail(unknowns) = c_root.colPivHouseholderQr().solve(e.linear);
-  source(Source::calibration) = calibration_uncertainty * (F * (gauge * reading));
+  source(Source::calibration) = calibration_uncertainty * reading(F, gauge);
 
   Index columns = 0;
   for (const MatrixXd& s : by_source_) columns += s.cols();
   root_.resize(F.rows(), columns);
   Index at = 0;
   for (const MatrixXd& s : by_source_) root_.middleCols(at, s.cols()) = s, at += s.cols();
+}
+
+Index UncertaintyBudget::first_column(Source s) const {
+  Index first = 0;
+  for (std::size_t i = 0; i < static_cast<std::size_t>(s); ++i) first += by_source_[i].cols();
+  return first;
 }
 
 UncertaintyBySource UncertaintyBudget::of(const MatrixXd& by_theta, const MatrixXd& by_c) const {

@@ -1,6 +1,7 @@
 #pragma once
 #include <Eigen/Core>
 #include <array>
+#include <functional>
 
 #include "correct/prior.h"
 #include "fit/run_residual.h"
@@ -34,11 +35,23 @@ class UncertaintyBudget {
   UncertaintyBudget(const RunResidual& residual, const RunResidual::Evaluation& e, const Prior& prior, const Eigen::MatrixXd& motion_prior,
                     double calibration_uncertainty, double inflation);
 
+  /// The same for runs whose c is not all of the linear unknowns: what the angle and the roughness of the motion know, F^T I_s F for H^-1 = F F^T, and how z answers to a
+  /// reading that is all too high by a part of itself.
+  struct Shares {
+    Eigen::MatrixXd angle, roughness;
+  };
+  using SharesOf = std::function<Shares(const Eigen::MatrixXd& F, const Eigen::MatrixXd& priors)>;
+  using AnswerToReading = std::function<Eigen::VectorXd(const Eigen::MatrixXd& F, const Eigen::MatrixXd& gauge)>;
+  UncertaintyBudget(const RunResidual::Evaluation& e, const Prior& prior, const SharesOf& shares, const AnswerToReading& reading, double calibration_uncertainty, double inflation);
+
   /// Of quantities that move with theta and c by these rows.
   UncertaintyBySource of(const Eigen::MatrixXd& by_theta, const Eigen::MatrixXd& by_c) const;
 
   /// Columns over z whose products with themselves sum to the covariance.
   const Eigen::MatrixXd& root() const { return root_; }
+  /// Which of them belong to a source.
+  Eigen::Index columns(Source s) const { return by_source_[static_cast<std::size_t>(s)].cols(); }
+  Eigen::Index first_column(Source s) const;
 
  private:
   Eigen::MatrixXd root_;  ///< over (theta, c)

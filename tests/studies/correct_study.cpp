@@ -3,7 +3,7 @@
 //
 // The truth is simulated at a quarter of the sampling interval from an angle that is a formula, with a circulation that may not be Wagner's.
 //
-//   correct_study [--trials N] [--seed S] [--threads T] [--only WORD]       table as Markdown on standard output; exit status 1 where coverage leaves its bounds
+//   correct_study [--trials N] [--seed S] [--threads T] [--only WORD] [--samples N]       table as Markdown on standard output; exit status 1 where coverage leaves its bounds
 
 #include <fmt/format.h>
 
@@ -83,7 +83,8 @@ std::vector<Shaft> shafts() {
 }
 
 constexpr double gauge_noise = 0.027, calibration_error = 0.0001, dt = 0.002;  // the calibration so good that it does not hide the rest
-constexpr Index samples = 3000, finer = 4;
+constexpr Index finer = 4;
+Index samples = 3000;  // of each run
 const double angle_noise = degrees(0.01);
 
 /// What one corrected run says about the bands.
@@ -250,6 +251,7 @@ int main(int argc, char** argv) {
   app.add_option("--seed", seed, "of the random numbers");
   app.add_option("--threads", threads, "at work")->check(CLI::PositiveNumber);
   app.add_option("--only", only, "lines whose name has this in it");
+  app.add_option("--samples", unrig::samples, "of each run")->check(CLI::Range(1500, 1000000));
   CLI11_PARSE(app, argc, argv);
 
   const unrig::Laboratory laboratory;

@@ -1,0 +1,101 @@
+#pragma once
+#include <Eigen/Core>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "core/aeroelastic_model.h"
+#include "core/convolution.h"
+#include "core/run.h"
+#include "correct/loaded_system.h"
+#include "correct/prior.h"
+#include "correct/settled_smoother.h"
+
+namespace unrig {
+
+/// A run in which the shaft hardly ever rests, against the model: as RunResidual, with a knot of the motion on every sample, in time n ln n and memory n.
+///
+/// The fine coefficients c of the angle's cubic spline are a random walk of third differences, d4 c = tau w with w white of variance 1: the fit's prior of the motion
+/// (fit/motion_prior.h) with one roughness tau for the whole record. The jerk, d3 c / dt^3, becomes one more state,
+///
+///   x_(k+1) = T x_k + J j_k,   j_k = j_(k-1) + tau w_k / dt^3,   gauge_k = C x_k + offset,   angle_k = p_k + offset,
+///
+/// with the exact step T, J of the rig, its lags and those of a rigid section beside it (correct/loaded_system.h). At a given theta the motion is then the mean of these states for given
+/// readings (correct/settled_smoother.h), and what is left, chi-square over data and prior with motion and offsets eliminated, is the sum of squares of the innovations e(y), a
+/// linear function of the readings. By Kaufman's rule, as there, the slopes of these residuals are -e(s_j) beside what the offsets reach, s_j = (d gauge / d theta_j) of the
+/// estimated motion: a convolution of its c with the derivative of the response to one spline.
+///
+/// The shaft is taken to have been on its way before the first sample, as uncertain there as later for given past, and the section is steady there. Missing samples are filled with the
+/// smoother's own estimate, which is exact for the estimate and leaves the band as if they were there.
+class RestlessRun {
+ public:
+  RestlessRun(const AeroelasticModel& model, const Run& run);
+
+  RunResidual::Solution solve(const Eigen::VectorXd& theta) const;
+  /// Derivatives with respect to `parameters`; the other columns are zero. `linear`: offsets, angle before the motion, signals of effects.
+  RunResidual::Evaluation differentiate(const RunResidual::Solution& solution, const std::vector<Eigen::Index>& parameters) const;
+
+  /// Noise of each channel from what the model at theta leaves of it, where that is less; angle samples that stand alone are left out, missing ones filled.
+  void settle_noise(const Eigen::VectorXd& theta);
+  /// tau that makes the readings most probable at theta.
+  void settle_roughness(const Eigen::VectorXd& theta);
+
+  /// Everything known at one theta.
+  struct Point {
+    Eigen::VectorXd theta;
+    LinearSystem system;  ///< without partials
+    std::optional<SettledSmoother> smoother;
+    std::vector<Eigen::MatrixXd> columns;  ///< what one of each linear unknown does, samples x channels
+    Eigen::MatrixXd white_columns;         ///< samples times channels x linear unknowns
+    Eigen::VectorXd linear;
+    Eigen::MatrixXd left;                  ///< readings without what they reach, samples x channels
+    Eigen::MatrixXd white;                 ///< innovations of that
+    double chi2 = 0, log_determinant = 0;
+  };
+  const Point& at(const Eigen::VectorXd& theta) const;
+  /// Rows over the filter's states, at the sample where they stand.
+  Eigen::RowVectorXd row(const Eigen::RowVectorXd& over_model_states) const;
+  /// Spline coefficients of the motion as deviation from the first, for convolution with spline responses.
+  Eigen::VectorXd motion(const Point& point, const SettledSmoother::Series& series) const;
+  /// Hands `take` the derivative of every output, with that motion (its transform), with respect to each parameter in turn: its place among them, samples x outputs.
+  void slopes(const Point& point, const Eigen::VectorXcd& motion, const std::vector<Eigen::Index>& parameters,
+              const std::function<void(Eigen::Index place, const Eigen::MatrixXd& slope)>& take) const;
+
+  Eigen::Index outputs() const { return static_cast<Eigen::Index>(channels_.size()); }  ///< fitted channels but the angle, which comes last
+  Eigen::Index samples() const { return run_->samples(); }
+  Eigen::Index observations() const { return observations_; }
+  Eigen::Index motion_state() const { return motion_state_; }
+  const Eigen::VectorXd& sigma() const { return sigma_; }
+  double roughness() const { return roughness_; }  ///< tau over the noise of the angle
+  double angle_level() const { return conditions_.onset_angle; }
+  double dt() const { return run_->dt; }
+  const Convolution& convolution() const { return convolution_; }
+  const Conditions& conditions() const { return conditions_; }
+  Eigen::Index longest_gap() const { return longest_gap_; }
+  double longest_gap_at() const { return longest_gap_at_; }  ///< s
+
+ private:
+  std::shared_ptr<Point> point_at(const Eigen::VectorXd& theta) const;
+  void fill_between_neighbours();
+
+  const AeroelasticModel* model_;
+  const Run* run_;
+  Conditions conditions_;
+  std::vector<std::string> channels_;
+  Convolution convolution_;
+  std::vector<Eigen::Index> kept_;       ///< states of the loaded system that the filter has: all but signals
+  std::vector<Eigen::Index> exogenous_;
+  Eigen::Index motion_state_ = 0;
+  Eigen::MatrixXd inputs_;               ///< measured inputs
+  Eigen::MatrixXd measured_;             ///< samples x channels, the angle from its level
+  Eigen::Matrix<bool, Eigen::Dynamic, Eigen::Dynamic> missing_;
+  Eigen::VectorXd sigma_;
+  double roughness_ = 0.1;
+  Eigen::Index observations_ = 0, longest_gap_ = 0;
+  double longest_gap_at_ = 0;
+  mutable std::shared_ptr<Point> last_;
+};
+
+}  // namespace unrig
