@@ -306,7 +306,9 @@ LinearSystem AeroelasticModel::system(const Conditions& conditions, const Vector
 AeroelasticModel AeroelasticModel::with_effects(const std::vector<std::string>& ids) const {
   AeroelasticModel model = *this;
   for (const std::string& id : ids) {
-    if (rig_.is_modal() && !effect(id).on_modal_rigs) throw std::invalid_argument(fmt::format("the effect {} needs a beam rig; '{}' is known only as modes", id, rig_.name));
+    const Needs needs = effect(id).needs;
+    if (needs != Needs::any_rig && rig_.is_modal()) throw std::invalid_argument(fmt::format("the effect {} needs a beam rig; '{}' is known only as modes", id, rig_.name));
+    if (!has(rig_, needs)) throw std::invalid_argument(fmt::format("the effect {} needs a sensor of the twist; '{}' has none (rig file: [[sensor]] with reads = \"twist\")", id, rig_.name));
     for (Parameter p : effect(id).parameters) {
       p.name = id + "." + p.name;
       model.parameters_.push_back(p);

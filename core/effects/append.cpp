@@ -1,5 +1,6 @@
 #include "core/effects/effect.h"
 
+#include <algorithm>
 #include <numbers>
 
 namespace unrig {
@@ -25,6 +26,12 @@ Index append(LinearSystem& system, const DualMatrix& F) {
 }
 
 }  // namespace
+
+bool has(const Rig& rig, Needs needs) {
+  const auto reads_twist = [](const Sensor& s) { return s.reads == SensorKind::twist || s.reads == SensorKind::twist_rate; };
+  if (needs == Needs::any_rig) return true;
+  return !rig.is_modal() && (needs == Needs::beam || std::any_of(rig.sensors.begin(), rig.sensors.end(), reads_twist));
+}
 
 Index append_signal(LinearSystem& system, const DualMatrix& F, const std::vector<Index>& columns, const DualMatrix& H) {
   const DualMatrix push = columns_of(system.B, columns) * H, direct = columns_of(system.D, columns) * H;

@@ -17,7 +17,7 @@ Effect carriage_vibration() {
   e.starts = {Eigen::VectorXd::Constant(1, 10)};
   e.frequency = [](const AeroelasticModel&, const Conditions& c, const Eigen::VectorXd& p) { return p[0] * c.speed; };
   e.acts = [](const Conditions& c) { return c.speed > 0; };
-  e.on_modal_rigs = false;
+  e.needs = Needs::beam;
   e.apply = [](LinearSystem& system, const EffectContext& c) {
     const double per_kappa = 2 * std::numbers::pi * c.conditions.speed, omega = c.parameter(0) * per_kappa;
     const Eigen::Matrix2d turn = (Eigen::Matrix2d() << 0, 1, -1, 0).finished();

@@ -15,7 +15,7 @@ Effect channel_delay() {
   e.parameters = {{"time", "s", 0.004, 1e-4, 0.2, false}};
   for (const double tau : {0.003, 0.008, 0.02, 0.05}) e.starts.push_back(Eigen::VectorXd::Constant(1, tau));
   e.acts = [](const Conditions& c) { return c.speed > 0; };
-  e.on_modal_rigs = false;
+  e.needs = Needs::beam;
   e.apply = [](LinearSystem& system, const EffectContext& c) {
     if (c.gauge < 0) return;
     constexpr int order = 3;

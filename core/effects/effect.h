@@ -29,6 +29,10 @@ struct EffectContext {
   double parameter(Eigen::Index k) const { return theta[first_parameter + k]; }
 };
 
+/// What a rig must have for an effect to make sense: elements and strips, not only modes; and of these a sensor of the twist.
+enum class Needs { any_rig, beam, twist_reading };
+bool has(const Rig& rig, Needs needs);
+
 /// One candidate for missing physics (formats.md, section 5): what it is, where it can act, and how it changes the linear system of a run.
 ///
 /// To add one: a file in core/effects/ that defines it, and one line in core/effects/table.cpp. Fit and simulation pick it up from there.
@@ -49,10 +53,10 @@ struct Effect {
   bool (*acts)(const Conditions& conditions) = nullptr;
   void (*apply)(LinearSystem& system, const EffectContext& context) = nullptr;
   bool in_the_load = false;   ///< it changes the load that a rigid rig would feel, which `correct` must not take out
-  bool on_modal_rigs = true;  ///< whether it makes sense for a rig that is known only as modes
+  Needs needs = Needs::any_rig;
 };
 
-/// All effects, in the order of formats.md.
+/// All effects, in the order of formats.md, then those that it does not list.
 const std::vector<Effect>& effects();
 /// By id; throws std::invalid_argument naming the choices.
 const Effect& effect(const std::string& id);

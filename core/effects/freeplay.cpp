@@ -47,7 +47,7 @@ Effect freeplay() {
   e.starts = {Eigen::VectorXd::Constant(1, 1e-3)};
   e.starts_for = [](const AeroelasticModel&, double widest) -> std::vector<Eigen::VectorXd> { return {Eigen::VectorXd::Constant(1, 0.05 * widest), Eigen::VectorXd::Constant(1, 0.3 * widest)}; };
   e.acts = [](const Conditions&) { return true; };
-  e.on_modal_rigs = false;
+  e.needs = Needs::beam;
   e.apply = [](LinearSystem& system, const EffectContext& c) {
     const Rig& rig = c.model.rig();
     const Basis& basis = c.model.basis();

@@ -14,7 +14,7 @@ Effect higher_mode() {
   e.starts = {Eigen::VectorXd(0)};
   e.acts = [](const Conditions&) { return true; };
   e.apply = [](LinearSystem&, const EffectContext&) {};  // a model with this effect is made with a richer basis (fit/model_of)
-  e.on_modal_rigs = false;
+  e.needs = Needs::beam;
   return e;
 }
 

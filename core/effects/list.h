@@ -19,5 +19,7 @@ Effect torsion_crosstalk();
 Effect gauge_drift();
 Effect mains_hum();
 Effect channel_delay();
+Effect twist_stiffness();
+Effect elastic_coupling();
 
 }  // namespace unrig

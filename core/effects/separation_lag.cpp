@@ -24,7 +24,7 @@ Effect separation_lag() {
   for (const double s : {4.0, 10.0, 25.0}) e.starts.push_back(Eigen::Vector2d(0.1, s));
   e.acts = [](const Conditions& c) { return c.speed > 0 && std::abs(c.onset_angle) > onset; };
   e.in_the_load = true;
-  e.on_modal_rigs = false;
+  e.needs = Needs::beam;
   e.apply = [](LinearSystem& system, const EffectContext& c) {
     const Eigen::Index n = system.states(), first = 2 * system.coordinates, terms = c.model.circulation().rate.size(), parameters = c.theta.size(), inputs = system.B.cols();
     if (system.lags == 0 || terms == 0) return;

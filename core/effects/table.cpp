@@ -22,6 +22,8 @@ const std::vector<Effect>& effects() {
       gauge_drift(),
       mains_hum(),
       channel_delay(),
+      twist_stiffness(),
+      elastic_coupling(),
   };
   return table;
 }

@@ -18,7 +18,7 @@ Effect tank_wave() {
   e.parameters = {{"frequency", "Hz", 0.5, 0.05, 5, false}, {"decay_time", "s", 8, 0.3, 1e3, false}};
   for (const double tau : {3.0, 12.0})
     for (double f = 0.15; f < 3; f *= 1.13) e.starts.push_back(Eigen::Vector2d(f, tau));
-  e.on_modal_rigs = false;
+  e.needs = Needs::beam;
   e.acts = [](const Conditions& c) { return c.density > 100; };
   e.apply = [](LinearSystem& system, const EffectContext& c) {
     constexpr double pi = std::numbers::pi;

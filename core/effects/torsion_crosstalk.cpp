@@ -13,7 +13,7 @@ Effect torsion_crosstalk() {
   e.source = "seed, section 1.2";
   e.parameters = {{"per_torque", "1/m", 0, -50, 50, false}};
   e.starts = {Eigen::VectorXd::Zero(1)};
-  e.on_modal_rigs = false;
+  e.needs = Needs::beam;
   e.acts = [](const Conditions&) { return true; };
   e.apply = [](LinearSystem& system, const EffectContext& c) {
     const Rig& rig = c.model.rig();

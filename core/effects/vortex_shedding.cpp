@@ -27,7 +27,7 @@ Effect vortex_shedding() {
   e.starts = {Eigen::VectorXd::Constant(1, 0.17)};
   e.frequency = [](const AeroelasticModel& model, const Conditions& c, const Eigen::VectorXd& p) { return p[0] * per_strouhal(c, 2 * model.rig().semichord()); };
   e.acts = [](const Conditions& c) { return c.speed > 0 && std::abs(c.onset_angle) > separated; };
-  e.on_modal_rigs = false;
+  e.needs = Needs::beam;
   e.apply = [](LinearSystem& system, const EffectContext& c) {
     const double per_st = 2 * std::numbers::pi * per_strouhal(c.conditions, 2 * c.model.rig().semichord());
     const Eigen::Matrix2d turn = (Eigen::Matrix2d() << 0, 1, -1, 0).finished();

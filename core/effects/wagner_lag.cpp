@@ -15,7 +15,7 @@ Effect wagner_lag() {
   e.starts = {Eigen::Vector2d(1, 1), Eigen::Vector2d(0.4, 1), Eigen::Vector2d(2.5, 1)};
   e.acts = [](const Conditions& c) { return c.speed > 0; };
   e.in_the_load = true;
-  e.on_modal_rigs = false;
+  e.needs = Needs::beam;
   e.apply = [](LinearSystem& system, const EffectContext& c) {
     const Eigen::Index n = system.states(), first = 2 * system.coordinates, terms = c.model.circulation().rate.size(), parameters = c.theta.size();
     if (system.lags == 0 || terms == 0) return;

@@ -5,6 +5,9 @@
 #include <cmath>
 #include <iterator>
 
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
 #include "core/effects/effect.h"
 #include "core/in_parallel.h"
 #include "fit/decays_first.h"
@@ -17,8 +20,8 @@ namespace {
 
 using Eigen::Index;
 using Strings = std::vector<std::string>;
+using Progress = std::function<void(const std::string&)>;
 
-constexpr double nearly_all = 0.97;    // share of the excess that an effect must remove to be named where something remains
 constexpr double half = 0.5;           // of the excess, where decays decide: the search leaves something of the other runs even when it has found what is missing
 constexpr double nearly_explained = 10, twice_the_noise = 2;
 constexpr double hardly_less = 0.9;    // of the excess: an effect that leaves so much of it is not what is missing
@@ -26,13 +29,14 @@ constexpr double decisive = 10;        // BIC: very strong evidence (Kass and Ra
 constexpr std::size_t most_refits = 5, most_effects = 3, most_in_full = 2;
 constexpr std::size_t few = 7;  // candidates that are all worth a fit
 
-/// Effects that can act in at least one of the runs of this rig and are not at work yet.
-Strings candidates(const DiagnoseProblem& problem, const JointProblem& joint, const Strings& at_work) {
+/// Effects that can act in at least one of the runs of this rig, are not at work yet, and not `hopeless`.
+Strings candidates(const DiagnoseProblem& problem, const JointProblem& joint, const Strings& at_work, const Strings& hopeless) {
   Strings ids;
   for (const Effect& e : effects()) {
     if (!problem.effects.empty() && std::find(problem.effects.begin(), problem.effects.end(), e.id) == problem.effects.end()) continue;
     if (std::find(at_work.begin(), at_work.end(), e.id) != at_work.end()) continue;
-    if (problem.rig.is_modal() && !e.on_modal_rigs) continue;
+    if (std::find(hopeless.begin(), hopeless.end(), e.id) != hopeless.end()) continue;
+    if (!has(problem.rig, e.needs)) continue;
     if (e.id == "higher-mode" && problem.rig.normal.modes == 0) continue;  // the model has them all
     if (std::any_of(joint.runs().begin(), joint.runs().end(), [&](const RunResidual& run) { return e.acts(run.conditions()); })) ids.push_back(e.id);
   }
@@ -50,16 +54,27 @@ void fit_linear(Trials& trials) {
 }
 
 /// By the free decays first, the most promising effect first; none after one that leaves nothing of a mismatch too large for two laws to explain alike.
-void fit_nonlinear(Trials& trials, const Trial& base) {
+void fit_nonlinear(const Progress& tell, Trials& trials, const Trial& base) {
   double least = base.reduced_chi2();
   for (std::size_t i = 0; i < trials.size(); ++i) {
     Trial& trial = trials[i];
+    tell(fmt::format("trying {}", fmt::join(trial.effects, " with ")));
     follow_nonlinear(trial, base, least);
     least = std::min(least, trial.reduced_chi2());
     if (!leaves_nothing(trial) || base.reduced_chi2() < nearly_explained) continue;
     trials.erase(trials.begin() + static_cast<std::ptrdiff_t>(i) + 1, trials.end());
   }
   std::sort(trials.begin(), trials.end(), [](const Trial& a, const Trial& b) { return a.reduced_chi2() < b.reduced_chi2(); });
+}
+
+/// What has come to rest at a limit of what its parameters may be, other than zero, and leaves something stands in for something else.
+bool plausible(const Trial& trial) {
+  const JointProblem& joint = trial.arrival.joint;
+  return leaves_nothing(trial) || std::none_of(joint.unknowns().begin(), joint.unknowns().end(), [&](const Unknown& u) {
+    const Parameter& p = joint.parameter(u);
+    const auto at = [&](double bound) { return bound != 0 && std::abs(u.value - bound) < 1e-6 * std::abs(bound); };
+    return !u.held && p.name.starts_with(trial.effects.back() + ".") && (at(p.lower) || at(p.upper));
+  });
 }
 
 bool any_leaves_nothing(const Trials& trials) { return std::any_of(trials.begin(), trials.end(), leaves_nothing); }
@@ -82,8 +97,8 @@ void fit_others_anew(const FitProblem& problem, Trials& trials) {
 }
 
 /// The best of all sets that have one effect more than `base`: all of them by one linear step, the promising ones in full.
-Trials try_one_more(const DiagnoseProblem& problem, const FitProblem& fit_problem, const Trial& base) {
-  const Strings ids = candidates(problem, base.arrival.joint, base.effects);
+Trials try_one_more(const DiagnoseProblem& problem, const FitProblem& fit_problem, const Trial& base, const Strings& hopeless, const Progress& tell) {
+  const Strings ids = candidates(problem, base.arrival.joint, base.effects, hopeless);
   std::vector<std::unique_ptr<Trial>> prepared(ids.size());
   in_parallel(ids.size(), [&](std::size_t i) {
     Strings set = base.effects;
@@ -95,10 +110,11 @@ Trials try_one_more(const DiagnoseProblem& problem, const FitProblem& fit_proble
   Trials linear, others, unpromising;
   for (const auto& trial : prepared) {
     const bool promises_nothing = effect(trial->effects.back()).parameters.empty();  // it may hold all the same
-    const bool promises = linear.size() + others.size() < most_refits && trial->score > 0.25 * best_score;
-    const bool step_says_nothing = nonlinear(*trial) && base.reduced_chi2() > twice_the_noise;  // a law far from the truth
-    if (prepared.size() <= few || promises_nothing || promises || step_says_nothing) (nonlinear(*trial) ? others : linear).push_back(std::move(*trial));
-    else if (unpromising.size() < most_in_full && !nonlinear(*trial)) unpromising.push_back(std::move(*trial));
+    const bool follows_law = nonlinear(*trial), far = base.reduced_chi2() > twice_the_noise;
+    const bool promises = linear.size() + others.size() < most_refits && (trial->score > 0.25 * best_score || (follows_law && far));
+    const bool step_says_nothing = far && brings_a_law(*trial);  // a law far from the truth
+    if (prepared.size() <= few || promises_nothing || promises || step_says_nothing) (follows_law ? others : linear).push_back(std::move(*trial));
+    else if (unpromising.size() < most_in_full && !follows_law) unpromising.push_back(std::move(*trial));
   }
   // Linear effects first, which are an order faster; nonlinear ones where none of those leaves nothing or they promise as much.
   constexpr double clearly = 0.8;
@@ -110,7 +126,7 @@ Trials try_one_more(const DiagnoseProblem& problem, const FitProblem& fit_proble
     done = any_leaves_nothing(linear);
   }
   if (!done || !favours_linear) {  // a decaying tone may leave nothing of what a weak drag does, and explain it worse
-    fit_nonlinear(others, base);
+    fit_nonlinear(tell, others, base);
     done = done || any_leaves_nothing(others);
     if (!done && !favours_linear) fit_anew(fit_problem, linear);
     const bool decays_have_told = has_decays(base.arrival.joint);  // from first guesses nonlinear laws are not found where their decays do not lead
@@ -123,6 +139,7 @@ Trials try_one_more(const DiagnoseProblem& problem, const FitProblem& fit_proble
     }
   }
   std::sort(linear.begin(), linear.end(), [](const Trial& a, const Trial& b) { return bic_difference(a, b) < 0; });
+  std::stable_partition(linear.begin(), linear.end(), plausible);
   return linear;
 }
 
@@ -161,7 +178,7 @@ std::vector<ImprovedRun> predict_unseen(const DiagnoseProblem& problem, const Fi
     const Run& run = leave_out ? problem.runs[i] : problem.heldout[i];
     const HeldoutResidual b = leave_out ? predict_left_out(baseline, fit_problem, i) : predict_heldout(baseline, fit_problem, run);
     const HeldoutResidual a = leave_out ? predict_left_out(best.arrival, after, i) : predict_heldout(best.arrival, after, run);
-    unseen[i] = {run.file, run.channel(b.channel).unit, true, leave_out, b.rms, a.rms, a.noise};
+    unseen[i] = {run.file, b.channel, run.channel(b.channel).unit, true, leave_out, b.rms, a.rms, a.noise};
   });
   return unseen;
 }
@@ -178,11 +195,13 @@ void describe(const DiagnoseProblem& problem, const FitProblem& fit_problem, con
   after.effects = best.effects;
   Arrival before_arrival = baseline.arrival, after_arrival = best.arrival;
   d.before = describe_fit(before_arrival, fit_problem, d.mismatch.found ? Settle::nothing : Settle::noise);  // a fit that explains nothing deserves no refinement
-  d.after = best.effects.empty() ? d.before : describe_fit(after_arrival, after, Settle::noise);
+  d.after = best.effects.empty() ? d.before : describe_fit(after_arrival, after, best.reduced_chi2() < twice_the_noise ? Settle::noise : Settle::nothing);
   d.bic_after = bic_difference(best, baseline) + (d.bic_before = d.before.bic());
   for (std::size_t r = 0; r < problem.runs.size(); ++r) {
-    const FittedChannel &b = d.before.runs[r].channels.front(), &a = d.after.runs[r].channels.front();
-    d.runs.push_back({problem.runs[r].file, b.unit, false, false, b.rms_residual, a.rms_residual, std::min(a.noise, b.noise)});
+    for (std::size_t c = 0; c < d.before.runs[r].channels.size(); ++c) {
+      const FittedChannel &b = d.before.runs[r].channels[c], &a = d.after.runs[r].channels[c];
+      d.runs.push_back({problem.runs[r].file, b.name, b.unit, false, false, b.rms_residual, a.rms_residual, std::min(a.noise, b.noise)});
+    }
   }
 }
 
@@ -193,8 +212,9 @@ bool is_idle(const JointProblem& joint, const std::string& id) {
   return false;
 }
 
-/// The effects of the best set, and the sets of `tried` that are as good.
-void name_missing(const Trial& baseline, const Trial& best, const Trials& tried, bool verdict_only, Diagnosis& d) {
+/// The effects of the best set, with their parameters.
+std::vector<MissingEffect> effects_of(const Trial& best, const Diagnosis& d) {
+  std::vector<MissingEffect> set;
   for (const std::string& id : best.effects) {
     if (is_idle(best.arrival.joint, id)) continue;
     const Effect& e = effect(id);
@@ -203,8 +223,13 @@ void name_missing(const Trial& baseline, const Trial& best, const Trials& tried,
       if (std::find(c.effects.begin(), c.effects.end(), id) != c.effects.end()) m.probability += c.probability;
     for (const FittedParameter& p : d.after.parameters)
       if (p.name.starts_with(id + ".")) m.parameters.push_back(p);
-    d.missing.push_back(m);
+    set.push_back(m);
   }
+  return set;
+}
+
+/// The sets of `tried` that are as good as the best.
+void name_equivalent(const Trial& baseline, const Trial& best, const Trials& tried, bool verdict_only, Diagnosis& d) {
   const double best_bic = bic_difference(best, baseline);
   for (const Trial& t : tried) {
     const bool other = t.effects != best.effects && t.effects.size() <= best.effects.size();
@@ -218,7 +243,7 @@ void name_missing(const Trial& baseline, const Trial& best, const Trials& tried,
 
 Diagnosis diagnose(const DiagnoseProblem& problem) {
   const auto begin = std::chrono::steady_clock::now();
-  const auto tell = [&](const std::string& what) {
+  const Progress tell = [&](const std::string& what) {
     if (problem.progress) problem.progress(what);
   };
   FitProblem fit_problem;
@@ -235,11 +260,14 @@ Diagnosis diagnose(const DiagnoseProblem& problem) {
 
   Trial best = baseline;
   Trials all_tried;
+  Strings hopeless;  // laws with which alone the fit is worse than without
   while (best.effects.size() < most_effects && !decays_decide(best) && (best.effects.empty() ? d.mismatch.found : best.reduced_chi2() > explained && locate_mismatch(best.arrival.joint).found)) {
     tell(best.effects.empty() ? "trying what may be missing" : "trying what may be missing beside " + best.effects.back());
-    Trials tried = try_one_more(problem, fit_problem, best);
+    Trials tried = try_one_more(problem, fit_problem, best, hopeless, tell);
     for (const Trial& t : tried) d.ranking.push_back({t.effects, t.reduced_chi2(), bic_difference(t, baseline), 0, best.effects.empty() ? t.score : 0});
-    if (tried.empty() || bic_difference(tried.front(), best) > -decisive) break;
+    for (const Trial& t : tried)
+      if (best.effects.empty() && brings_a_law(t) && bic_difference(t, baseline) > decisive) hopeless.push_back(t.effects.back());
+    if (tried.empty() || !(best.effects.empty() || plausible(tried.front())) || bic_difference(tried.front(), best) > -decisive) break;
     if (!leaves_nothing(tried.front()) && excess(tried.front()) > hardly_less * excess(best)) break;
     best = without_superfluous(fit_problem, tried.front());
     std::move(tried.begin(), tried.end(), std::back_inserter(all_tried));
@@ -252,7 +280,7 @@ Diagnosis diagnose(const DiagnoseProblem& problem) {
   const std::vector<ImprovedRun> unseen = problem.verdict_only ? std::vector<ImprovedRun>{} : predict_unseen(problem, fit_problem, baseline.arrival, best);
   const bool predicts = best.effects.empty() || power_over_noise(unseen, &ImprovedRun::rms_after) <= power_over_noise(unseen, &ImprovedRun::rms_before);
   const bool follows_decays = decays_decide(best) && best.decays.chi2 < explained && excess(best) < half * excess(baseline);
-  const bool named = !best.effects.empty() && predicts && (clean || follows_decays || excess(best) < (1 - nearly_all) * excess(baseline));
+  const bool named = !best.effects.empty() && predicts && (clean || follows_decays || excess(best) < (1 - enough_to_name) * excess(baseline));
   d.unexplained = d.mismatch.found && !(clean && predicts);
 
   if (!problem.verdict_only) {
@@ -261,7 +289,13 @@ Diagnosis diagnose(const DiagnoseProblem& problem) {
     for (const ImprovedRun& run : unseen) d.runs.push_back(run);
     if (d.unexplained) d.missing_force = missing_forces(best.arrival.joint);
   }
-  if (named) name_missing(baseline, best, all_tried, problem.verdict_only, d);
+  if (named) {
+    d.missing = effects_of(best, d);
+    name_equivalent(baseline, best, all_tried, problem.verdict_only, d);
+  } else if (!best.effects.empty()) {
+    d.closest = effects_of(best, d);
+    d.removed_by_closest = 1 - excess(best) / excess(baseline);
+  }
   d.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
   return d;
 }

@@ -15,6 +15,8 @@
 
 namespace unrig {
 
+constexpr double enough_to_name = 0.97;  ///< share of the excess that effects must remove to be named where something remains
+
 /// Where do these recordings and the model of their rig differ, and which physics was left out?
 struct DiagnoseProblem {
   Rig rig;
@@ -42,9 +44,9 @@ struct MissingEffect {
   std::vector<FittedParameter> parameters;
 };
 
-/// One run before and after the effects that were found; residuals of its first fitted channel.
+/// A channel of a run before and after the effects that were found; of a run that was not fitted its first fitted channel.
 struct ImprovedRun {
-  std::string file, unit;
+  std::string file, channel, unit;
   bool heldout = false;   ///< not fitted but predicted
   bool left_out = false;  ///< predicted from the other runs, where no run was held out; it has an entry as a fitted run too
   double rms_before = 0, rms_after = 0, noise = 0;
@@ -56,6 +58,8 @@ struct Diagnosis {
   std::vector<std::vector<std::string>> equivalent;  ///< sets that these runs cannot tell from the winner
   std::vector<std::optional<SeparatingRecording>> separated_by;  ///< and the recording that would, for each of them
   bool unexplained = false;            ///< a significant mismatch remains
+  std::vector<MissingEffect> closest;  ///< where nothing is named: the best set that was tried
+  double removed_by_closest = 0;       ///< share of the excess
   Mismatch remaining;                  ///< and where it sits
   double bic_before = 0, bic_after = 0;
   std::vector<ImprovedRun> runs;

@@ -62,23 +62,40 @@ std::string verdict(const Diagnosis& d) {
   return fmt::format("Missing is {}{}.", fmt::join(ids, " and "), d.unexplained ? "; something remains unexplained" : "");
 }
 
-}  // namespace
-
-std::string to_json(const Diagnosis& d) {
-  ordered_json missing = ordered_json::array(), runs = ordered_json::array(), ranking = ordered_json::array();
-  for (const MissingEffect& m : d.missing) {
+ordered_json effects_json(const std::vector<MissingEffect>& effects) {
+  ordered_json list = ordered_json::array();
+  for (const MissingEffect& m : effects) {
     ordered_json parameters = ordered_json::array();
     for (const FittedParameter& p : m.parameters) {
       ordered_json one = {{"name", p.name}, {"value", number(p.value)}, {"std_error", number(p.std_error)}, {"unit", p.unit}};
       if (!p.run.empty()) one["run"] = p.run;
       parameters.push_back(one);
     }
-    missing.push_back({{"effect", m.effect}, {"probability", number(m.probability)}, {"equation", m.equation}, {"source", m.source}, {"parameters", parameters}});
+    list.push_back({{"effect", m.effect}, {"probability", number(m.probability)}, {"equation", m.equation}, {"source", m.source}, {"parameters", parameters}});
   }
+  return list;
+}
+
+std::string effects_text(const std::vector<MissingEffect>& effects) {
+  std::string text;
+  for (const MissingEffect& m : effects) {
+    text += fmt::format("[[{}]] probability {:.4f} among the sets tried\n    {}    ({})\n", m.effect, m.probability, m.equation, m.source);
+    for (const FittedParameter& p : m.parameters) {
+      const std::string error = p.std_error > 0 ? fmt::format(" +/- {:.2g}", p.std_error) : std::string();
+      text += fmt::format("    {} = {:.6g}{} {}{}{}\n", p.name, p.value, error, p.unit, p.run.empty() ? "" : " (" + base_name(p.run) + ")", p.identified ? "" : " (not identified)");
+    }
+  }
+  return text;
+}
+
+}  // namespace
+
+std::string to_json(const Diagnosis& d) {
+  ordered_json runs = ordered_json::array(), ranking = ordered_json::array();
   for (const ImprovedRun& r : d.runs) {
-    runs.push_back({{"file", r.file}, {"heldout", r.heldout}, {"left_out", r.left_out}, {"rms_before", number(r.rms_before)}, {"rms_after", number(r.rms_after)}, {"noise", number(r.noise)}, {"unit", r.unit}});
+    runs.push_back({{"file", r.file}, {"channel", r.channel}, {"heldout", r.heldout}, {"left_out", r.left_out}, {"rms_before", number(r.rms_before)}, {"rms_after", number(r.rms_after)}, {"noise", number(r.noise)}, {"unit", r.unit}});
     for (const ResidualMaps& m : d.maps)
-      if (m.run == r.file && !r.heldout && !r.left_out) runs.back()["map"] = map_json(m);
+      if (m.run == r.file && m.channel == r.channel && !r.heldout && !r.left_out) runs.back()["map"] = map_json(m);
   }
   for (const Candidate& c : d.ranking)
     ranking.push_back({{"effect", set_name(c.effects)}, {"score", number(c.score)}, {"reduced_chi2", number(c.reduced_chi2)}, {"delta_bic", number(c.delta_bic)}, {"probability", number(c.probability)}});
@@ -99,10 +116,11 @@ std::string to_json(const Diagnosis& d) {
   const ordered_json json = {{"unrig", "diagnosis"},
                              {"verdict", verdict(d)},
                              {"mismatch", mismatch_json(d.mismatch)},
-                             {"missing", missing},
+                             {"missing", effects_json(d.missing)},
                              {"equivalent", d.equivalent},
                              {"separated_by", separated},
                              {"unexplained", d.unexplained},
+                             {"closest", {{"effects", effects_json(d.closest)}, {"share_of_excess_removed", number(d.removed_by_closest)}}},
                              {"remaining", mismatch_json(d.remaining)},
                              {"improvement", {{"bic_before", number(d.bic_before)}, {"bic_after", number(d.bic_after)}, {"runs", runs}}},
                              {"price_of_ignorance", shifts},
@@ -115,19 +133,16 @@ std::string to_json(const Diagnosis& d) {
 std::string report(const Diagnosis& d) {
   std::string text = verdict(d) + "\n";
   if (d.mismatch.found) text += fmt::format("[[Mismatch]] p = {:.2g}\n    {}\n", d.mismatch.p_value, d.mismatch.summary);
-  for (const MissingEffect& m : d.missing) {
-    text += fmt::format("[[{}]] probability {:.4f} among the sets tried\n    {}    ({})\n", m.effect, m.probability, m.equation, m.source);
-    for (const FittedParameter& p : m.parameters)
-      text += fmt::format("    {} = {:.6g} +/- {:.2g} {}{}\n", p.name, p.value, p.std_error, p.unit, p.run.empty() ? "" : " (" + base_name(p.run) + ")");
-  }
+  text += effects_text(d.missing);
   for (std::size_t i = 0; i < d.equivalent.size(); ++i) text += "    " + cannot_tell(d.equivalent[i], d.separated_by[i]) + "\n";
   if (d.unexplained) text += "[[Unexplained]]\n    " + d.remaining.summary + "\n";
+  if (!d.closest.empty()) text += fmt::format("    The set that comes closest removes {:.0f} % of the excess, {}:\n", 100 * d.removed_by_closest, d.removed_by_closest < enough_to_name ? "too little to be named" : "but does not predict runs that were not fitted") + effects_text(d.closest);
   for (const MissingForce& f : d.missing_force)
     text += fmt::format("    what is left of {} would be explained by a force of {:.3g} N r.m.s. at the calibration element, known to {:.2g} N (diagnosis file: missing_force)\n",
                         base_name(f.run), std::sqrt(f.value.squaredNorm() / static_cast<double>(f.value.size())), f.standard_deviation);
   text += "[[Improvement]]\n";
   for (const ImprovedRun& r : d.runs)
-    text += fmt::format("    {:<20} {:<8} {:9.4g} -> {:9.4g} {} (noise {:.4g})\n", base_name(r.file), r.left_out ? "left out" : r.heldout ? "held out" : "fitted", r.rms_before, r.rms_after, r.unit, r.noise);
+    text += fmt::format("    {:<20} {:<8} {:9.4g} -> {:9.4g} {} (noise {:.4g})\n", base_name(r.file) + (r.channel == "gauge" ? "" : ": " + r.channel), r.left_out ? "left out" : r.heldout ? "held out" : "fitted", r.rms_before, r.rms_after, r.unit, r.noise);
   if (d.ranking.size() > 1) {
     text += "[[Tried]] reduced chi-square, BIC against nothing missing\n";
     for (const Candidate& c : d.ranking) text += fmt::format("    {:<36} {:10.4g} {:12.5g}\n", set_name(c.effects), c.reduced_chi2, c.delta_bic);

@@ -54,12 +54,12 @@ std::vector<LeftOfRun> left_of_runs(const JointProblem& joint) {
     double power = 0;
     for (std::size_t c = 0; c < p.channels.size(); ++c) {
       const VectorXd left = standardised_residual(run, p, c);
+      const auto samples = static_cast<double>((left.array() != 0).count());
       power += left.squaredNorm();
-      all[r].samples += static_cast<double>((left.array() != 0).count());
-      if (c == 0) all[r].independent = independent_share(left);
+      all[r].samples += samples;
+      all[r].independent += independent_share(left) * samples;
     }
     all[r].variance = power / all[r].samples;
-    all[r].independent *= all[r].samples;
     look_at_angle(run, p, all[r]);
   });
   return all;
@@ -134,13 +134,18 @@ double left_of_decays(const Trial& trial) {
   return power / count;
 }
 
+/// Whether an effect is a nonlinear law in any of the runs.
+bool is_a_law(const std::string& id, const AeroelasticModel& rig, const JointProblem& joint) {
+  const AeroelasticModel model = rig.with_effects({id});
+  return std::any_of(joint.runs().begin(), joint.runs().end(), [&](const RunResidual& run) { return !model.system(run.conditions(), model.start_values(), run.channels()).feedback.empty(); });
+}
+
 /// The effects of a problem: those that are linear in every run, then each of the others by itself.
 std::vector<std::vector<std::string>> in_order(const FitProblem& problem, const JointProblem& joint) {
   std::vector<std::vector<std::string>> order(1);
+  const AeroelasticModel rig = model_of(problem.rig, problem.runs, problem.circulation);
   for (const std::string& id : problem.effects) {
-    const AeroelasticModel model = model_of(problem.rig, problem.runs, problem.circulation, {id});
-    const bool bends = std::any_of(joint.runs().begin(), joint.runs().end(), [&](const RunResidual& run) { return !model.system(run.conditions(), model.start_values(), run.channels()).feedback.empty(); });
-    if (bends) order.push_back({id});
+    if (is_a_law(id, rig, joint)) order.push_back({id});
     else order.front().push_back(id);
   }
   if (order.front().empty()) order.erase(order.begin());
@@ -154,6 +159,11 @@ bool nonlinear(const Trial& trial) {
   for (std::size_t r = 0; r < joint.runs().size(); ++r)
     if (joint.runs()[r].largest_arguments(joint.theta(r)).size() > 0) return true;
   return false;
+}
+
+bool brings_a_law(const Trial& trial) {
+  const AeroelasticModel& model = trial.arrival.joint.model();
+  return is_a_law(trial.effects.back(), AeroelasticModel(model.rig(), model.basis(), model.circulation()), trial.arrival.joint);
 }
 
 double Trial::reduced_chi2() const {

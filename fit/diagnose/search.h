@@ -28,6 +28,8 @@ inline bool leaves_nothing(const Trial& trial) { return trial.reduced_chi2() < e
 
 /// Whether nonlinear effects are at work in any of the runs.
 bool nonlinear(const Trial& trial);
+/// Whether the last effect is such a law.
+bool brings_a_law(const Trial& trial);
 
 /// -2 ln likelihood of the gauge with each run's own variance, and of the angle where both explain the run, plus ln(samples) per variable, of `a` less that of `b`
 /// (G. Schwarz, Annals of Statistics 6 (1978) 461). Samples of the gauge count by the colour of the better of the two.

@@ -117,7 +117,8 @@ TrialResult run_trials(const TrialProblem& problem) {
   check_for_trials(problem.rig);
   Strings ids = problem.effects;
   if (ids.empty())
-    for (const Effect& e : effects()) ids.push_back(e.id);
+    for (const Effect& e : effects())
+      if (has(problem.rig, e.needs)) ids.push_back(e.id);
   if (const std::size_t at_a_time = problem.pairs ? 2 : 1; problem.outside && ids.size() <= at_a_time)
     throw InputError({"--outside", 0}, fmt::format("{} to hide in turn, {} at a time", ids.size(), at_a_time), "wanted candidates beside what is hidden", "Name more of --effects.");
   TrialResult result;

@@ -1,0 +1,49 @@
+#include <cmath>
+
+#include "core/effects/list.h"
+
+namespace unrig {
+
+namespace {
+
+/// -k_3 ((z + d)^3 - d^3)
+double cubic(double z, const double* p, double& slope, double* partial) {
+  const double k = p[0], d = p[1], shape = z * (z * z + 3 * z * d + 3 * d * d);
+  slope = -k * 3 * (z + d) * (z + d);
+  partial[0] = -shape;
+  partial[1] = -k * 3 * z * (z + 2 * d);
+  return -k * shape;
+}
+
+}  // namespace
+
+/// Torsional stiffness that changes with amplitude: M = -k_3 ((theta + d)^3 - d^3), theta the elastic twist [rad] of the section in the first torsional mode from where it stands
+/// at rest, d [rad] how far that is from the spring's point of symmetry, the same in all runs; k_3 [N m/rad^3], negative where the rig softens. The couple acts on that mode.
+/// Without a channel that reads the twist it hardly shows.
+/// Source: B. H. K. Lee, S. J. Price, Y. S. Wong, Progress in Aerospace Sciences 35 (1999) 205, section 2 (cubic restoring forces in pitch).
+Effect twist_stiffness() {
+  Effect e;
+  e.id = "twist-stiffness";
+  e.summary = "torsional stiffness that changes with amplitude";
+  e.equation = "M = -k_3 ((theta + d)^3 - d^3)";
+  e.source = "Lee, Price and Wong, Progress in Aerospace Sciences 35 (1999) 205";
+  e.parameters = {{"coefficient", "N.m/rad^3", 0, -1e30, 1e30, false}, {"offset", "rad", 0, -1, 1, false}};
+  e.starts = {Eigen::Vector2d(0, 0)};
+  e.starts_for = [](const AeroelasticModel& model, double widest) -> std::vector<Eigen::VectorXd> {  // a tenth of the linear couple at the largest twist, symmetric or not
+    const Basis& basis = model.basis();
+    const double omega = basis.omega[basis.normal_modes], shape = basis.twist(model.rig().submerged.back() - 1, basis.normal_modes), k = 0.1 * std::pow(omega / (shape * widest), 2);
+    return {Eigen::Vector2d(k, 0.3 * widest), Eigen::Vector2d(k, -0.3 * widest), Eigen::Vector2d(k, 0), Eigen::Vector2d(-k, 0)};
+  };
+  e.needs = Needs::twist_reading;
+  e.acts = [](const Conditions&) { return true; };
+  e.apply = [](LinearSystem& system, const EffectContext& c) {
+    const Basis& basis = c.model.basis();
+    if (basis.torsion_modes < 1) return;
+    const Eigen::Index first = basis.normal_modes;
+    const double shape = basis.twist(c.model.rig().submerged.back() - 1, first);
+    append_feedback(system, port(system, c.ports.coordinate + first, shape), {displacement_of(system, shape * Eigen::RowVectorXd::Unit(system.coordinates, first)), c.first_parameter, 2, cubic});
+  };
+  return e;
+}
+
+}  // namespace unrig
