@@ -4,7 +4,6 @@
 
 namespace unrig::rest_rows {
 
-using Eigen::HouseholderQR;
 using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
@@ -25,7 +24,7 @@ MatrixXd orthonormal_polynomials(Index samples) {
   chebyshev.col(0).setOnes();
   chebyshev.col(1) = x;
   for (Index k = 2; k < smooth_terms; ++k) chebyshev.col(k) = 2 * x.cwiseProduct(chebyshev.col(k - 1)) - chebyshev.col(k - 2);
-  return HouseholderQR<MatrixXd>(chebyshev).householderQ() * MatrixXd::Identity(samples, smooth_terms);
+  return Eigen::HouseholderQR<MatrixXd>(chebyshev).householderQ() * MatrixXd::Identity(samples, smooth_terms);
 }
 
 const VectorXd& smooth_constant() {
@@ -39,10 +38,9 @@ SmoothReadings smooth_readings(const Eigen::Ref<const VectorXd>& w, const Eigen:
     const VectorXd coefficients = B.transpose() * y;
     return {w[0] * MatrixXd::Identity(smooth_terms, smooth_terms), w[0] * coefficients, w[0] * w[0] * (y - B * coefficients).squaredNorm()};
   }
-  const HouseholderQR<MatrixXd> qr(w.asDiagonal() * B);
-  VectorXd rotated = w.cwiseProduct(y);
-  rotated.applyOnTheLeft(qr.householderQ().adjoint());
-  return {run_rows::triangle_of(qr), rotated.head(smooth_terms), rotated.tail(rotated.size() - smooth_terms).squaredNorm()};
+  const Householder qr(w.asDiagonal() * B);
+  const VectorXd rotated = qr.rotated(w.cwiseProduct(y)).col(0);
+  return {qr.triangle(), rotated.head(smooth_terms), rotated.tail(rotated.size() - smooth_terms).squaredNorm()};
 }
 
 FreeRows::FreeRows(MatrixXd free_rows) : rows(std::move(free_rows)) {
@@ -51,10 +49,10 @@ FreeRows::FreeRows(MatrixXd free_rows) : rows(std::move(free_rows)) {
   const Index n = rows.cols();
   MatrixXd span(stretch_samples, n + 1);
   span << stretch, VectorXd::Ones(stretch_samples);
-  rotation = std::make_shared<const HouseholderQR<MatrixXd>>(std::move(span));
-  size = run_rows::triangle_of(*rotation).topLeftCorner(n, n);
+  rotation = std::make_shared<const Householder>(std::move(span));
+  size = rotation->triangle().topLeftCorner(n, n);
   smooth = polynomials().transpose() * stretch;
-  rough = run_rows::triangle_of(HouseholderQR<MatrixXd>(stretch - polynomials() * smooth));
+  rough = Householder(stretch - polynomials() * smooth).triangle();
 }
 
 bool FreeRows::is_smooth(const MatrixXd& state, const MatrixXd& before) const {

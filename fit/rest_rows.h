@@ -1,9 +1,9 @@
 #pragma once
 #include <Eigen/Core>
-#include <Eigen/QR>
 #include <memory>
 #include <vector>
 
+#include "core/householder.h"
 #include "core/response.h"
 
 // Readings of a rig that is left to itself, in few rows. RunResidual's arithmetic; not for others to include.
@@ -38,7 +38,7 @@ struct FreeRows {
   Eigen::MatrixXd rows;    ///< samples x n
   Eigen::MatrixXd smooth;  ///< coefficients of its polynomial part: smooth_terms x n
   Eigen::MatrixXd size, rough;  ///< |size x| is the norm of the response, |rough x| that of what is no polynomial
-  std::shared_ptr<const Eigen::HouseholderQR<Eigen::MatrixXd>> rotation;  ///< of [rows | 1]
+  std::shared_ptr<const Householder> rotation;  ///< of [rows | 1]
 
   explicit FreeRows(Eigen::MatrixXd rows);
   /// True where the states in the columns of `state` respond smoothly, measured by what those of `before` respond with.

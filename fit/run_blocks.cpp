@@ -4,15 +4,14 @@
 
 namespace unrig::run_rows {
 
-using Eigen::HouseholderQR;
 using Eigen::Index;
 using Eigen::MatrixXd;
 
 namespace {
 
 /// Rows in the coordinates of the rotation: the first it keeps, and the others.
-std::pair<MatrixXd, MatrixXd> split(const HouseholderQR<MatrixXd>& rotation, MatrixXd all) {
-  all.applyOnTheLeft(rotation.householderQ().adjoint());
+std::pair<MatrixXd, MatrixXd> split(const Householder& rotation, MatrixXd all) {
+  all = rotation.rotated(std::move(all));
   const Index kept = std::min(rotation.rows(), rotation.cols());
   return {all.topRows(kept), all.bottomRows(all.rows() - kept)};
 }
@@ -20,21 +19,21 @@ std::pair<MatrixXd, MatrixXd> split(const HouseholderQR<MatrixXd>& rotation, Mat
 }  // namespace
 
 MatrixXd Block::add_stretch(MatrixXd span) {
-  rotations_.push_back(std::make_shared<const HouseholderQR<MatrixXd>>(std::move(span)));
-  return triangle_of(*rotations_.back());
+  rotations_.push_back(std::make_shared<const Householder>(std::move(span)));
+  return rotations_.back()->triangle();
 }
 
 MatrixXd Block::add_stretch(double weight, const Rotation& rotation) {
   rotations_.push_back(rotation);
-  return weight * triangle_of(*rotation);
+  return weight * rotation->triangle();
 }
 
 MatrixXd Block::join(const std::vector<MatrixXd>& spans, Index offset) {
   const Index states = start.rows();
   MatrixXd span = stacked(spans, states + 1);
   if (spans.size() > 1) {
-    joint_ = std::make_shared<const HouseholderQR<MatrixXd>>(std::move(span));
-    span = triangle_of(*joint_);
+    joint_ = std::make_shared<const Householder>(std::move(span));
+    span = joint_->triangle();
   }
   MatrixXd reach = span.leftCols(states) * start;
   reach.col(offset) += span.col(states);

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "core/exact_step.h"
+#include "core/householder.h"
 #include "fit/rest_rows.h"
 #include "fit/run_residual.h"
 
@@ -16,15 +17,8 @@ namespace unrig {
 
 namespace run_rows {
 
-inline Eigen::MatrixXd triangle_of(const Eigen::HouseholderQR<Eigen::MatrixXd>& qr) {
-  return qr.matrixQR().topRows(std::min(qr.rows(), qr.cols())).triangularView<Eigen::Upper>();
-}
-
 /// The upper triangular (or trapezoidal) factor of `rows`: the same inner products in no more rows than columns.
-inline Eigen::MatrixXd compress(Eigen::MatrixXd rows) {
-  const Eigen::HouseholderQR<Eigen::Ref<Eigen::MatrixXd>> qr(rows);  // in place
-  return rows.topRows(std::min(rows.rows(), rows.cols())).triangularView<Eigen::Upper>();
-}
+inline Eigen::MatrixXd compress(Eigen::MatrixXd rows) { return Householder(std::move(rows)).triangle(); }
 
 inline Eigen::MatrixXd stacked(const std::vector<Eigen::MatrixXd>& blocks, Eigen::Index columns) {
   Eigen::Index total = 0;
@@ -44,8 +38,8 @@ class Eliminator {
   explicit Eliminator(const Eigen::MatrixXd& columns) : scale_(columns.colwise().norm().transpose().cwiseMax(1e-300).cwiseInverse()) {
     constexpr double rank_tolerance = 1e-11;
     const Eigen::MatrixXd scaled = columns * scale_.asDiagonal();
-    quick_.compute(scaled);
-    if (columns.rows() >= columns.cols() && (columns.cols() == 0 || quick_.matrixQR().diagonal().cwiseAbs().minCoeff() > rank_tolerance)) return;
+    quick_ = Householder(scaled);
+    if (columns.rows() >= columns.cols() && (columns.cols() == 0 || quick_.factors().diagonal().cwiseAbs().minCoeff() > rank_tolerance)) return;
     pivoted_.setThreshold(rank_tolerance);
     pivoted_.compute(scaled);
     deficient_ = true;
@@ -53,7 +47,7 @@ class Eliminator {
   Eigen::Index rank() const { return deficient_ ? pivoted_.rank() : scale_.size(); }
   /// Coordinates of `rows` in the columns' space (the first `rank` rows) and beside it.
   Eigen::MatrixXd rotated(const Eigen::MatrixXd& rows) const {
-    return deficient_ ? Eigen::MatrixXd(pivoted_.householderQ().setLength(pivoted_.rank()).adjoint() * rows) : Eigen::MatrixXd(quick_.householderQ().adjoint() * rows);
+    return deficient_ ? Eigen::MatrixXd(pivoted_.householderQ().setLength(pivoted_.rank()).adjoint() * rows) : quick_.rotated(rows);
   }
   /// Solution of R x = rotated, back in the columns' own scale.
   Eigen::MatrixXd solve(const Eigen::MatrixXd& rotated) const {
@@ -63,7 +57,7 @@ class Eliminator {
       x.topRows(r) = pivoted_.matrixQR().topLeftCorner(r, r).triangularView<Eigen::Upper>().solve(rotated.topRows(r));
       x = pivoted_.colsPermutation() * x;
     } else {
-      x = quick_.matrixQR().topLeftCorner(r, r).triangularView<Eigen::Upper>().solve(rotated.topRows(r));
+      x = quick_.factors().topLeftCorner(r, r).triangularView<Eigen::Upper>().solve(rotated.topRows(r));
     }
     return scale_.asDiagonal() * x;
   }
@@ -78,14 +72,14 @@ class Eliminator {
       r = permuted * pivoted_.colsPermutation().transpose();
       r = compress(r);
     } else {
-      r = quick_.matrixQR().topRows(n).triangularView<Eigen::Upper>();
+      r = quick_.factors().topRows(n).triangularView<Eigen::Upper>();
     }
     return r * scale_.cwiseInverse().asDiagonal();
   }
 
  private:
   Eigen::VectorXd scale_;
-  Eigen::HouseholderQR<Eigen::MatrixXd> quick_;
+  Householder quick_;
   Eigen::ColPivHouseholderQR<Eigen::MatrixXd> pivoted_;
   bool deficient_ = false;
 };
@@ -100,7 +94,7 @@ struct Rotated {
 /// own splines, the free response and the offset are clearly fewer than its samples.
 class Block {
  public:
-  using Rotation = std::shared_ptr<const Eigen::HouseholderQR<Eigen::MatrixXd>>;
+  using Rotation = std::shared_ptr<const Householder>;
 
   Interval samples;
   bool moving = false;

@@ -38,20 +38,25 @@ double noise_of(const VectorXd& value) {
 namespace {
 
 /// How far a motion reaches into a rest beside it: a shaft that sets out softly has left its level long before a few samples show that it moves. Means over `block`
-/// samples, in turn from the motion on, until two lie on the rest's level. `mean(i)`: of block i.
+/// samples, in turn from the motion on, until two lie on the rest's level, within what the rest's own means scatter by, and not less than `white_scatter`. `mean(i)`: of block i.
 template <class Mean>
-Index soft_edge(Index blocks, Index block, double tolerance, Mean mean) {
+Index soft_edge(Index blocks, Index block, double white_scatter, Mean mean) {
   std::vector<double> all;
   for (Index i = 0; i < blocks; ++i)
     if (const double m = mean(i); std::isfinite(m)) all.push_back(m);
   if (all.size() < 4) return 0;  // too short to have a level
   std::nth_element(all.begin(), all.begin() + static_cast<std::ptrdiff_t>(all.size() / 2), all.end());
   const double level = all[all.size() / 2];
+  for (double& m : all) m = std::abs(m - level);
+  std::nth_element(all.begin(), all.begin() + static_cast<std::ptrdiff_t>(all.size() / 2), all.end());
+  constexpr double deviations = 1.4826;  // of a normal distribution in its median absolute deviation
+  const double scatter = std::max(white_scatter, deviations * all[all.size() / 2]);  // coloured noise does not average out
+  constexpr double chance = 4;           // standard deviations of a block's mean
   constexpr Index farthest = 25;  // blocks: a drift of the channel is no motion
   Index reach = 0;
   for (Index i = 0; i < std::min(blocks, farthest) && i < reach + 2; ++i)
-    if (std::abs(mean(i) - level) > tolerance) reach = i + 1;
-  constexpr Index unseen = 2;  // blocks: what sets out like t^3 is within the tolerance for as long again
+    if (std::abs(mean(i) - level) > chance * scatter) reach = i + 1;
+  constexpr Index unseen = 2;  // blocks: what sets out like t^3 is within the scatter for as long again
   return reach > 0 ? std::min(blocks, reach + unseen) * block : 0;
 }
 
@@ -59,13 +64,12 @@ Index soft_edge(Index blocks, Index block, double tolerance, Mean mean) {
 std::vector<Interval> moving_softly(const VectorXd& angle, double sigma) {
   std::vector<Interval> intervals = moving(angle, sigma);
   constexpr Index block = 20;
-  constexpr double chance = 4;  // standard deviations of a block's mean
-  const double tolerance = chance * sigma / std::sqrt(static_cast<double>(block));
+  const double scatter = sigma / std::sqrt(static_cast<double>(block));
   const std::vector<Interval> hard = intervals;
   for (std::size_t i = 0; i <= hard.size() && !hard.empty(); ++i) {  // the rest before interval i
     const Index first = i == 0 ? 0 : hard[i - 1].last, last = i == hard.size() ? angle.size() : hard[i].first, blocks = (last - first) / block;
-    if (i < hard.size()) intervals[i].first -= soft_edge(blocks, block, tolerance, [&](Index k) { return angle.segment(last - (k + 1) * block, block).mean(); });
-    if (i > 0) intervals[i - 1].last += soft_edge(blocks, block, tolerance, [&](Index k) { return angle.segment(first + k * block, block).mean(); });
+    if (i < hard.size()) intervals[i].first -= soft_edge(blocks, block, scatter, [&](Index k) { return angle.segment(last - (k + 1) * block, block).mean(); });
+    if (i > 0) intervals[i - 1].last += soft_edge(blocks, block, scatter, [&](Index k) { return angle.segment(first + k * block, block).mean(); });
   }
   return intervals;
 }

@@ -9,7 +9,6 @@
 #include "core/text_file.h"
 #include "fit/diagnose/diagnose.h"
 #include "fit/diagnose/diagnosis_files.h"
-#include "tests/support/shared_data.h"
 
 namespace unrig {
 namespace {
@@ -64,23 +63,6 @@ TEST(Diagnose, FindsTheQuadraticDrag) {
   expect_verdict("drag", {{"quadratic-drag.coefficient", nlohmann::json::parse(read_text(campaigns + "KEY.json"))["drag"]["parameters"]["drag_coefficient"]}});
 }
 TEST(Diagnose, FindsTheDryFriction) { expect_verdict("friction", {}); }
-
-/// Roll decay of a ship model: its damping is known to grow with the rate and its righting couple not to be linear (Himeno 1981). The linear model leaves 0.174 deg, one with
-/// both terms 0.0186 deg (measured independently of this project).
-TEST(Diagnose, ShipRollHasQuadraticDampingAndNonlinearStiffness) {
-  UNRIG_NEEDS_SHARED("real/ship_roll/run_21337.csv");
-  const std::string folder = test::shared_path("real/ship_roll");
-  DiagnoseProblem problem;
-  problem.rig = read_rig(folder + "/rig.toml");
-  problem.runs.push_back(read_run(folder + "/run_21337.csv"));
-  const Diagnosis d = diagnose(problem);
-  std::vector<std::string> found;
-  for (const MissingEffect& m : d.missing) found.push_back(m.effect);
-  EXPECT_NE(std::find(found.begin(), found.end(), "quadratic-drag"), found.end());
-  EXPECT_NE(std::find(found.begin(), found.end(), "cubic-stiffness"), found.end());
-  constexpr double degree = 3.14159265358979323846 / 180;
-  EXPECT_LT(d.runs.front().rms_after, 0.0186 * degree);
-}
 
 TEST(Diagnose, WithoutAHeldOutRunEachIsPredictedFromTheOthers) {
   DiagnoseProblem problem = fitted_runs("wave");
