@@ -128,9 +128,30 @@ double neighbours_alike(const RestlessRun& run, const RestlessRun::Point& point,
   return convolution.mean(beside) / convolution.mean(power);
 }
 
+/// By how much the motion's variance of w is larger around each sample than in the whole record: 1 where it is not clearly so. What the roughness of the motion leaves open of the load
+/// goes with it, since the smoother's error is linear in w. From the smoothed w, differences of the jerk, over blocks of `block` samples, in which some three numbers are determined, each as
+/// wide as the wider of its neighbours: a shaft that sets out is rougher than one that swings.
+VectorXd rougher_than_the_record(const RestlessRun& run, const RestlessRun::Point& point, const SettledSmoother::Series& own) {
+  constexpr Index block = 50;
+  constexpr double clearly = 3;
+  const Index n = run.samples(), states = point.smoother->filter().P.rows(), blocks = (n - 1) / block;
+  VectorXd rougher = VectorXd::Ones(n);
+  if (blocks < 3) return rougher;
+  const VectorXd jerk = point.smoother->smoothed(point.smoother->quantity(RowVectorXd::Unit(states, states - 1)), own);
+  const VectorXd squares = (jerk.tail(n - 1) - jerk.head(n - 1)).cwiseAbs2();
+  const double whole = squares.mean();
+  VectorXd local(blocks);
+  for (Index i = 0; i < blocks; ++i) local[i] = squares.segment(i * block, block).mean() / whole;
+  for (Index k = 0; k < n; ++k) {
+    const Index own_block = std::min(k / block, blocks - 1), first = std::max<Index>(0, own_block - 1), last = std::min(blocks - 1, own_block + 1);
+    if (const double widest = local.segment(first, last - first + 1).maxCoeff(); widest > clearly) rougher[k] = widest;
+  }
+  return rougher;
+}
+
 /// Standard deviations of a load, by sources.
-CorrectedLoad with_bands(const RestlessRun& run, const RestlessRun::Point& point, const SettledSmoother::Quantity& quantity, Index load, const MatrixXf& D, const VectorXd& by_reading,
-                         const UncertaintyBudget& budget, double calibration, double inflation) {
+CorrectedLoad with_bands(const RestlessRun& run, const RestlessRun::Point& point, const SettledSmoother::Quantity& quantity, Index load, const VectorXd& rougher, const MatrixXf& D,
+                         const VectorXd& by_reading, const UncertaintyBudget& budget, double calibration, double inflation) {
   const Index n = run.samples(), channels = run.outputs() + 1;
   const VectorXd passed = point.smoother->passed_on(quantity).cwiseProduct(run.sigma().cwiseAbs2());
   const double middle = quantity.variance[n / 2], angle = std::clamp(passed[channels - 1] / middle, 0.0, 1.0), gauge = std::clamp(passed.head(channels - 1).sum() / middle, 0.0, 1.0 - angle);
@@ -138,7 +159,7 @@ CorrectedLoad with_bands(const RestlessRun& run, const RestlessRun::Point& point
   share[static_cast<std::size_t>(Source::gauge)] = gauge * inflation * inflation;
   share[static_cast<std::size_t>(Source::angle)] = angle * inflation * inflation;
   share[static_cast<std::size_t>(Source::regularisation)] = 1 - gauge - angle;
-  const double whole = std::accumulate(share.begin(), share.end(), 0.0), alike = neighbours_alike(run, point, load);
+  const double alike = neighbours_alike(run, point, load);
 
   CorrectedLoad result;
   result.std.resize(n);
@@ -151,16 +172,20 @@ CorrectedLoad with_bands(const RestlessRun& run, const RestlessRun::Point& point
     MatrixXd rows = D.middleRows(first, count).cast<double>() * budget.root();
     rows.col(budget.first_column(Source::calibration)) += calibration * by_reading.segment(first, count);
     const VectorXd variance = quantity.variance.segment(first, count).cwiseMax(0);
+    VectorXd motion = VectorXd::Zero(count);  // variance for given z
     for (Index s = 0; s < sources; ++s) {
       const auto source = static_cast<Source>(s);
       const VectorXd of_z = rows.middleCols(budget.first_column(source), budget.columns(source)).rowwise().squaredNorm();
-      result.by_source.col(s).segment(first, count) = (of_z + share[static_cast<std::size_t>(s)] * variance).cwiseSqrt();
+      VectorXd of_motion = share[static_cast<std::size_t>(s)] * variance;
+      if (source == Source::regularisation) of_motion = of_motion.cwiseProduct(rougher.segment(first, count)).eval();
+      result.by_source.col(s).segment(first, count) = (of_z + of_motion).cwiseSqrt();
+      motion += of_motion;
     }
     result.std.segment(first, count) = result.by_source.middleRows(first, count).rowwise().norm();
     for (Index k = 0; k < count; ++k) {  // the angle between neighbours, from the chord
       const double std = result.std[first + k];
       if (before.size() > 0 && std > 0 && before_std > 0) {
-        const double off = (rows.row(k) / std - before / before_std).squaredNorm() + whole * variance[k] * (std::pow(1 / std - 1 / before_std, 2) + 2 * (1 - alike) / (std * before_std));
+        const double off = (rows.row(k) / std - before / before_std).squaredNorm() + motion[k] * (std::pow(1 / std - 1 / before_std, 2) + 2 * (1 - alike) / (std * before_std));
         length += 2 * std::asin(std::min(1.0, std::sqrt(off) / 2));
       }
       before = rows.row(k);
@@ -182,20 +207,24 @@ void warn(const RestlessRun& run, const RestlessRun::Point& point, double reduce
   if (run.longest_gap() > unnoticed)
     result.warnings.push_back(fmt::format("{}: {} samples are missing from {:.4g} s on while the shaft moves; the band there is too narrow. Correct the parts before and behind by themselves.", result.file,
                                           run.longest_gap(), run.longest_gap_at()));
-  // Where the record is rougher than one tau for all of it allows, the innovations are larger.
-  constexpr Index parts = 20;
-  constexpr double chance = 5, matters = 1.2;
-  const Index n = run.samples(), length = n / parts;
-  double worst = 0, worst_at = 0;
-  for (Index p = 0; length > 0 && p < parts; ++p) {
-    const double mean = point.white.middleRows(p * length, length).squaredNorm() / static_cast<double>(length * point.white.cols());
-    if (mean > worst) worst = mean, worst_at = start + static_cast<double>(p * length) * run.dt();
+  // Where the record is rougher than one tau for all of it allows, the innovations are larger: over a few knots, or over parts of the record.
+  const Index n = run.samples();
+  constexpr Index few = 50, parts = 20;
+  constexpr double chance = 6, matters = 2, matters_for_few = 4;  // a start or a faster part is no reason to warn: the band knows of it
+  for (const Index length : {few, n / parts}) {
+    const double scatter = std::sqrt(2.0 / static_cast<double>(length * point.white.cols())), most = std::max(length == few ? matters_for_few : matters, 1 + chance * scatter) * std::max(1.0, reduced_chi2);
+    double worst = 0, worst_at = 0, affected = 0;
+    for (Index first = 0; first + length <= n; first += length) {
+      const double mean = point.white.middleRows(first, length).squaredNorm() / static_cast<double>(length * point.white.cols());
+      if (mean > most) affected += static_cast<double>(length) / static_cast<double>(n);
+      if (mean > worst) worst = mean, worst_at = start + static_cast<double>(first) * run.dt();
+    }
+    if (worst <= most) continue;
+    result.warnings.push_back(fmt::format("{}: in {:.2g} % of the record, most of all from {:.4g} s on, the readings follow the model less well than elsewhere: over {:.3g} s there what a sample adds is {:.2f} times "
+                                          "what is expected. The motion, or something that the model lacks, is rougher there and the band may be too narrow. Correct that part by itself.",
+                                          result.file, 100 * affected, worst_at, static_cast<double>(length) * run.dt(), std::sqrt(worst)));
+    return;
   }
-  const double scatter = std::sqrt(2.0 / static_cast<double>(length * point.white.cols()));
-  if (worst > std::max(matters, 1 + chance * scatter) * std::max(1.0, reduced_chi2))
-    result.warnings.push_back(fmt::format("{}: from {:.4g} s on, over {:.3g} s, what the model leaves is {:.2f} times its noise, in the whole record {:.2f} times; the motion, or something that the model lacks, "
-                                          "is rougher there than elsewhere and the band too narrow. Correct that part by itself.",
-                                          result.file, worst_at, static_cast<double>(length) * run.dt(), std::sqrt(worst), std::sqrt(reduced_chi2)));
 }
 
 /// The answers at half and at twice the weight of the regularisation, by one step from the best.
@@ -271,10 +300,11 @@ void correct_restless(const RestlessProblem& problem, CorrectResult& result) {
   if (problem.imposed.any()) result.indicial.take_tests_of(tests);
 
   const SettledSmoother::Series own = point.smoother->series(point.left);
+  const VectorXd rougher = rougher_than_the_record(run, point, own);
   const std::array<SettledSmoother::Quantity, loads> quantities = load_quantities(point);
   for (std::size_t l = 0; l < loads; ++l) {
     CorrectedLoad& load = l == 0 ? result.circulatory : result.normal_force;
-    load = with_bands(run, point, quantities[l], static_cast<Index>(l), looked.slopes.load[l], looked.slopes.by_reading[l], *looked.budget, result.calibration_uncertainty, looked.inflation);
+    load = with_bands(run, point, quantities[l], static_cast<Index>(l), rougher, looked.slopes.load[l], looked.slopes.by_reading[l], *looked.budget, result.calibration_uncertainty, looked.inflation);
     load.value = point.smoother->smoothed(quantities[l], own).array() + problem.steady_per_reading * point.linear[0];
   }
   vary_weight(best, looked.e, looked.slopes, model, result);

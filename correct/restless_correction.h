@@ -27,7 +27,8 @@ struct RestlessProblem {
 ///   var load_k = V_k + D_k cov(z) D_k',    D = direct - M Z
 ///
 /// cov(z) by sources as in correct/uncertainty_budget.h; V_k by what the noise of each channel makes of itself on its way through the smoother far from the ends, the rest being the roughness of
-/// the motion, which is regularisation. (What one source's parts in V and in cov(z) have in common is left out of both columns: over all sources it sums to zero.)
+/// the motion, which is regularisation. Where the motion found is rougher than in the whole record (the variance of w over 50 samples more than three times as large), that last part is larger by
+/// as much: a shaft that sets out is rougher than one that swings. (What one source's parts in V and in cov(z) have in common is left out of both columns: over all sources it sums to zero.)
 void correct_restless(const RestlessProblem& problem, CorrectResult& result);
 
 }  // namespace unrig
