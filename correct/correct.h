@@ -58,6 +58,10 @@ struct CorrectResult {
 /// gauge and angle. Each amplitude has a normal prior around zero whose standard deviation maximises the evidence (correct/prior.h); it decides what the
 /// record leaves open. The answers at half and at twice its weight, 1/tau^2, are part of the result.
 ///
+/// Where the shaft moves for most of the record, and for longer than the fit's 400 knots can follow (they would lie more than eight samples apart), motion and load are found by a settled
+/// filter and smoother with a knot on every sample, in time and memory that go with the record (correct/restless_run.h, correct/restless_correction.h). Where it rests in between, a warning says
+/// that the knots lie too far apart.
+///
 /// Effects of the fit are honoured, but those that are part of the load (`wagner-lag`, `separation-lag`): they belong into the answer, and the free response takes their place.
 ///
 /// What the user wants imposed on the response holds exactly in the answer. The standard deviations under an imposed phi(0) take it for exact; under imposed monotonicity they are
@@ -67,7 +71,7 @@ struct CorrectResult {
 /// Standard deviations by source: correct/uncertainty_budget.h. They are computed at up to some thousand samples, all of those in which the shaft moves as long as
 /// these are few, and interpolated between. The gauge's zero and the steady load cannot be told apart: the steady part of the load is the reading
 /// before the motion.
-/// Throws InputError where the run has no angle channel or no stream, NoAnswer where the angle does not move.
+/// Throws InputError where the run has no angle channel or no stream, NoAnswer where the angle does not move, or where it hardly ever rests and the fit names a nonlinear force.
 CorrectResult correct(const CorrectProblem& problem);
 
 }  // namespace unrig

@@ -220,6 +220,12 @@ void warn(const RestlessRun& run, const RestlessRun::Point& point, double reduce
       if (mean > worst) worst = mean, worst_at = start + static_cast<double>(first) * run.dt();
     }
     if (worst <= most) continue;
+    if (worst_at == start) {
+      result.warnings.push_back(fmt::format("{}: at the first sample the shaft or the rig moves already, where both must be at rest: what a sample adds there is {:.2f} times what is expected. Load and response "
+                                            "are wrong. Begin the record before the motion.",
+                                            result.file, std::sqrt(worst)));
+      return;
+    }
     result.warnings.push_back(fmt::format("{}: in {:.2g} % of the record, most of all from {:.4g} s on, the readings follow the model less well than elsewhere: over {:.3g} s there what a sample adds is {:.2f} times "
                                           "what is expected. The motion, or something that the model lacks, is rougher there and the band may be too narrow. Correct that part by itself.",
                                           result.file, 100 * affected, worst_at, static_cast<double>(length) * run.dt(), std::sqrt(worst)));

@@ -1,8 +1,10 @@
-// The load of a rigid rig out of one run of 3000 samples, and out of long ones: a step of 1.5 degrees within 60 ms and a rest behind it, or two of them.
+// The load of a rigid rig out of one run of 3000 samples, and out of long ones: a step of 1.5 degrees within 60 ms and a rest behind it, or two of them; shafts that never
+// rest.
 
 #include <benchmark/benchmark.h>
 
 #include <algorithm>
+#include <cmath>
 #include <filesystem>
 #include <numbers>
 #include <random>
@@ -75,6 +77,59 @@ void correct_a_long_run(benchmark::State& state) {
   for (auto _ : state) benchmark::DoNotOptimize(correct(problem).slope);
 }
 BENCHMARK(correct_a_long_run)->ArgNames({"samples", "steps"})->Args({10000, 1})->Args({100000, 1})->Args({1000000, 1})->Args({1000000, 2})->Unit(benchmark::kMillisecond);
+
+/// Motions that never rest, with a soft start.
+double soft(double x) { return x <= 0 ? 0 : x >= 1 ? 1 : x * x * x * (10 - 15 * x + 6 * x * x); }
+double sine(double t, double) { return 2 * std::sin(2 * std::numbers::pi * 1.5 * t); }
+double twelve_frequencies(double t, double) {
+  double sum = 0;
+  for (int i = 1; i <= 12; ++i) sum += std::sin(2 * std::numbers::pi * 0.41 * i * (1 + 1e-3 * std::sqrt(i)) * t + 2.39996 * i * i) / i;
+  return 1.5 * sum;
+}
+double chirp(double t, double duration) {
+  constexpr double first = 0.2, last = 5;  // Hz
+  const double growth = std::log(last / first);
+  return 2 * std::sin(2 * std::numbers::pi * first * duration / growth * std::expm1(t / duration * growth));
+}
+
+/// With counters: r.m.s. error of the circulatory load over its range, samples inside their 95 % band, all and in the worst tenth of the record.
+void correct_a_restless_run(benchmark::State& state, double (*motion)(double t, double duration)) {
+  constexpr double degree = std::numbers::pi / 180;
+  const Rig rig = read_rig(test::null_campaign("rig.toml"));
+  const FittedRig fitted = fitted_rig(rig);
+  const Eigen::Index samples = state.range(0);
+  Run run;
+  run.file = "restless.csv";
+  run.density = 998.2;
+  run.speed = 0.6096;
+  run.dt = 0.002;
+  Eigen::VectorXd alpha(samples);
+  for (Eigen::Index k = 0; k < samples; ++k) alpha[k] = (2 + soft((run.time(k) - 0.2) / 0.3) * motion(run.time(k) - 0.2, run.dt * static_cast<double>(samples))) * degree;
+  run.channels.push_back({"alpha", "rad", "rad", 1, alpha});
+  const AeroelasticModel model(rig, make_basis(rig, fitted.normal_modes, fitted.torsion_modes), wagner(Wagner::within_1e6));
+  Eigen::VectorXd theta = theta_for(model, fitted, "");
+  theta[model.index("normal_force_slope")] = 5.86;
+  CorrectProblem problem{rig, fitted, simulate({model, theta, run, PitchBetweenSamples::spline, {}, {}}).run};
+  Eigen::VectorXd truth;
+  for (Channel& channel : problem.run.channels) {
+    if (channel.name == "alpha") add_noise(channel.value, 0.01 * degree, 1);
+    if (channel.name == "gauge") add_noise(channel.value, 0.027, 2);
+    if (channel.name == "circulatory") truth = channel.value;
+  }
+  for (auto _ : state) {
+    const CorrectedLoad load = correct(problem).circulatory;
+    const Eigen::ArrayXd off = (load.value - truth).cwiseAbs();
+    const Eigen::ArrayXd inside = (off < 1.96 * load.std.array()).cast<double>();
+    double worst = 1;
+    for (Eigen::Index tenth = 0; tenth < 10; ++tenth) worst = std::min(worst, inside.segment(tenth * samples / 10, samples / 10).mean());
+    state.counters["error"] = std::sqrt(off.square().mean()) / (truth.maxCoeff() - truth.minCoeff());
+    state.counters["inside"] = inside.mean();
+    state.counters["worst_tenth"] = worst;
+  }
+}
+BENCHMARK_CAPTURE(correct_a_restless_run, sine, &sine)->ArgName("samples")->Arg(10000)->Arg(100000)->Unit(benchmark::kMillisecond);
+BENCHMARK_CAPTURE(correct_a_restless_run, twelve_frequencies, &twelve_frequencies)->ArgName("samples")->Arg(10000)->Arg(100000)->Arg(1000000)->Unit(benchmark::kMillisecond);
+BENCHMARK_CAPTURE(correct_a_restless_run, chirp, &chirp)->ArgName("samples")->Arg(10000)->Arg(100000)->Unit(benchmark::kMillisecond);
 
 }  // namespace
 }  // namespace unrig
