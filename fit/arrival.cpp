@@ -207,25 +207,31 @@ std::vector<VectorXd> starts_of(JointProblem& joint, const Effect& e) {
 
 /// The best of each effect's starts, by chi-square with the linear unknowns following; never none of it, from where it may have no slope.
 void choose_effect_starts(Arrival& arrival, const FitProblem& problem, const std::vector<std::string>& added) {
+  JointProblem at_the_rig = arrival.joint;
+  constexpr double astray = 10;  // what a rig moves by there says nothing of the size of a force
+  const bool lost = back_to_the_rig(at_the_rig, astray);
+  if (lost) back_to_the_rig(at_the_rig, 2);
+  JointProblem& judge = lost ? at_the_rig : arrival.joint;
   for (const std::string& id : added) {
     tell(problem, "looking for " + id);
-    const std::vector<Unknown*> own = unknowns_of(arrival.joint, id);
     const auto& parameters = effect(id).parameters;
-    const auto set = [&](const VectorXd& values) {
-      for (Unknown* u : own)
+    const auto set = [&](JointProblem& joint, const VectorXd& values) {
+      for (Unknown* u : unknowns_of(joint, id))
         for (std::size_t k = 0; k < parameters.size(); ++k)
-          if (arrival.joint.parameter(*u).name == id + "." + parameters[k].name) u->value = values[static_cast<Index>(k)];
+          if (joint.parameter(*u).name == id + "." + parameters[k].name) u->value = values[static_cast<Index>(k)];
     };
-    const std::vector<VectorXd> starts = starts_of(arrival.joint, effect(id));
+    const std::vector<VectorXd> starts = starts_of(judge, effect(id));
     const VectorXd* best = nullptr;
     double least = std::numeric_limits<double>::infinity();
     for (const VectorXd& start : starts) {
-      set(start);
-      const double chi2 = starts.size() > 1 ? arrival.joint.chi2() : 0;
+      set(judge, start);
+      const double chi2 = starts.size() > 1 ? judge.chi2() : 0;
       if (chi2 < least || !best) best = &start;
       least = std::min(least, chi2);
     }
-    if (best) set(*best);
+    if (!best) continue;
+    set(judge, *best);
+    set(arrival.joint, *best);
   }
   set_starts(arrival.joint, problem.start);
 }
@@ -267,6 +273,19 @@ double Arrival::reduced_chi2() const {
   double freedom = 0;
   for (const RunResidual& run : joint.runs()) freedom += static_cast<double>(run.degrees_of_freedom());
   return joint.chi2() / freedom;
+}
+
+bool back_to_the_rig(JointProblem& joint, double factor) {
+  const VectorXd rig = joint.model().start_values();
+  bool any = false;
+  for (Unknown& u : joint.unknowns()) {
+    const double there = rig[u.parameter];
+    const bool near = u.value > there / factor && u.value < factor * there;
+    if (u.held || !(there > 0) || near || belongs_to_an_effect(joint.parameter(u).name)) continue;
+    u.value = there;
+    any = true;
+  }
+  return any;
 }
 
 std::vector<Unknown*> unknowns_of(JointProblem& joint, const std::string& id) {

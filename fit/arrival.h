@@ -49,6 +49,9 @@ void refine(Arrival& arrival, const FitProblem& problem);
 /// Whether a parameter of this name is some effect's.
 bool belongs_to_an_effect(const std::string& parameter);
 
+/// A fit that cannot follow leaves parameters far from the truth: the rig's own that are further than `factor` from their first values go back there. Whether any did.
+bool back_to_the_rig(JointProblem& joint, double factor);
+
 /// The unknowns that belong to effect `id`.
 std::vector<Unknown*> unknowns_of(JointProblem& joint, const std::string& id);
 

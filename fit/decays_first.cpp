@@ -22,16 +22,6 @@ constexpr double followed = 1.2;  // chi-square over the degrees of freedom of d
 
 bool is_decay(const RunResidual& run) { return run.motion().unknowns() == 0; }
 
-/// A fit that cannot follow leaves parameters far from the truth: those more than a factor two from their first values go back there.
-void back_to_the_rig(JointProblem& joint) {
-  const VectorXd rig = joint.model().start_values();
-  for (Unknown& u : joint.unknowns()) {
-    const double there = rig[u.parameter];
-    const bool near = u.value > there / 2 && u.value < 2 * there;
-    if (!u.held && there > 0 && !near && !belongs_to_an_effect(joint.parameter(u).name)) u.value = there;
-  }
-}
-
 /// theta and the decays' trajectories, with laws that are trusted more and more (fit/law_smoother.h).
 class GrowingTrust {
  public:
@@ -324,7 +314,7 @@ bool has_decays(const JointProblem& joint) { return std::any_of(joint.runs().beg
 
 DecaysLeft fit_decays(JointProblem& joint, const std::string& id) {
   JointProblem start = joint;
-  back_to_the_rig(start);
+  back_to_the_rig(start, 2);
   for (RunResidual& run : start.runs())
     if (is_decay(run)) run.temper(1);
   const std::vector<Unknown*> own = unknowns_of(start, id);

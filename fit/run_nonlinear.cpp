@@ -169,22 +169,30 @@ VectorXd RunResidual::as_the_angle_says() const {
   return angle.solve(angle.rotated(rows.rightCols(1)));
 }
 
-/// c searched along exact tangents over a part of the record that grows from where any start will do.
+/// c searched along exact tangents over a part of the record that grows from where any start will do. The least chi-squares of a motion are many: smaller strides lead to others.
 RunResidual::NonlinearPoint RunResidual::along_growing_record(const Linearised& lin, const VectorXd& theta, NonlinearPoint point) const {
-  constexpr double growth = 1.3;
-  RunResidual part = *this;
-  Linearised part_lin;
-  part_lin.system = lin.system;
-  part_lin.step = lin.step;
-  const Index moves = motion_.unknowns() > 0 ? motion_.active().front().first : 0;
-  if (motion_.unknowns() > 0) point.linear = as_the_angle_says();
-  for (part.last_sample_ = std::min(last_sample_, moves + 2 * unknowns_); part.last_sample_ < last_sample_;) {
-    part.search_along_tangents(part_lin, theta, part.nonlinear_point(lin, theta, point.linear));
-    if (!std::isfinite(part_lin.chi2)) return point;
-    point.linear = part_lin.linear;
-    part.last_sample_ = std::min(last_sample_, static_cast<Index>(growth * static_cast<double>(part.last_sample_)) + 1);
-  }
-  return nonlinear_point(lin, theta, point.linear);
+  constexpr double growth = 1.3, small = 1.1, followed = 1.5;
+  const bool moves = motion_.unknowns() > 0;
+  const Index before = moves ? motion_.active().front().first : 0;
+  if (moves) point.linear = as_the_angle_says();
+  const auto in_strides = [&](double stride) {
+    RunResidual part = *this;
+    Linearised part_lin;
+    part_lin.system = lin.system;
+    part_lin.step = lin.step;
+    NonlinearPoint at = point;
+    for (part.last_sample_ = std::min(last_sample_, before + 2 * unknowns_); part.last_sample_ < last_sample_;) {
+      part.search_along_tangents(part_lin, theta, part.nonlinear_point(lin, theta, at.linear));
+      if (!std::isfinite(part_lin.chi2)) return at;
+      at.linear = part_lin.linear;
+      part.last_sample_ = std::min(last_sample_, static_cast<Index>(stride * static_cast<double>(part.last_sample_)) + 1);
+    }
+    return nonlinear_point(lin, theta, at.linear);
+  };
+  NonlinearPoint found = in_strides(growth);
+  if (!moves || !thorough_ || found.chi2 * tempered_ * tempered_ < followed * static_cast<double>(degrees_of_freedom())) return found;
+  NonlinearPoint other = in_strides(small);
+  return other.chi2 < found.chi2 ? other : found;
 }
 
 void RunResidual::solve_nonlinear(Linearised& lin, const VectorXd& theta) const {
@@ -248,11 +256,12 @@ void RunResidual::follow_nonlinear_partials(const LinearSystem& system, const Ve
   }
 }
 
-bool RunResidual::find_linear(const VectorXd& theta) {
+bool RunResidual::find_linear(const VectorXd& theta, bool thoroughly) {
   if (model_->system(conditions_, theta, channels_).feedback.empty()) return false;
   from_afar_ = true;
+  thorough_ = thoroughly;
   solve(theta);
-  from_afar_ = false;
+  from_afar_ = thorough_ = false;
   guide_ = {};
   return true;
 }

@@ -168,8 +168,9 @@ class RunResidual {
   Eigen::Index finer() const { return finer_; }
 
   /// Moves c of a nonlinear run with prescribed motion to the least chi-square that exact tangents reach over a record that grows, at theta. For laws with corners that
-  /// the rig crosses all the time (freeplay), or that it leaves and meets again (friction). False, and nothing done, where the model is linear.
-  bool find_linear(const Eigen::VectorXd& theta);
+  /// the rig crosses all the time (freeplay), or that it leaves and meets again (friction); `thoroughly`: in smaller strides too where that does not follow the run, which at this
+  /// theta it should. False, and nothing done, where the model is linear.
+  bool find_linear(const Eigen::VectorXd& theta, bool thoroughly = false);
   /// Whether following the model takes several steps a sample, which makes exact tangents dear.
   bool takes_small_steps(const Eigen::VectorXd& theta) const;
 
@@ -234,7 +235,7 @@ class RunResidual {
   Eigen::MatrixXd weight_;    ///< 1 / sigma, 0 where left out
   std::vector<double> sigma_;
   double tempered_ = 1;
-  bool from_afar_ = false;
+  bool from_afar_ = false, thorough_ = false;
   Eigen::VectorXd angle_, angle_weight_;
   double angle_sigma_ = 0;
   Eigen::MatrixXd motion_prior_;  ///< [c | 0]

@@ -158,7 +158,16 @@ Trial without_superfluous(const FitProblem& fit_problem, Trial trial) {
   return trial;
 }
 
-double excess(const Trial& trial) { return std::max(0.0, trial.reduced_chi2() - 1); }
+/// Residual power above the noise, over the noise; a run that is left with less than its noise makes up for no other.
+double excess(const Trial& trial) {
+  double power = 0, count = 0;
+  for (std::size_t r = 0; r < trial.variance.size(); ++r) {
+    const auto n = static_cast<double>(trial.arrival.joint.runs()[r].run().samples());
+    power += n * std::max(0.0, trial.variance[r] - 1);
+    count += n;
+  }
+  return power / count;
+}
 
 /// exp(-BIC/2) over the sum of it over all.
 void give_probabilities(std::vector<Candidate>& ranking) {
@@ -277,7 +286,7 @@ Diagnosis diagnose(const DiagnoseProblem& problem) {
   std::sort(d.ranking.begin(), d.ranking.end(), [](const Candidate& a, const Candidate& b) { return a.delta_bic < b.delta_bic; });
 
   d.remaining = locate_mismatch(best.arrival.joint);
-  const bool clean = leaves_nothing(best) || !d.remaining.found;
+  const bool clean = !d.remaining.found;
   const std::vector<ImprovedRun> unseen = problem.verdict_only ? std::vector<ImprovedRun>{} : predict_unseen(problem, fit_problem, baseline.arrival, best);
   const bool predicts = best.effects.empty() || power_over_noise(unseen, &ImprovedRun::rms_after) <= power_over_noise(unseen, &ImprovedRun::rms_before);
   const bool follows_decays = decays_decide(best) && best.decays.chi2 < explained && excess(best) < half * excess(baseline);

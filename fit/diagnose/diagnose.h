@@ -75,7 +75,7 @@ struct Diagnosis {
 /// 3. The promising ones are fitted in full, everything free, while the weights return to those of the noise. They are compared by BIC with each run's
 ///    own variance and with as many samples as the remaining colour leaves independent.
 /// 4. While a mismatch remains a further effect is tried beside the best; an effect that others made superfluous is taken away again.
-/// An effect is named only where the set it belongs to leaves nothing (reduced chi-square near one), or nearly all of the excess is gone, and where runs that were
+/// An effect is named only where no significant mismatch remains beside the set it belongs to, or nearly all of the excess is gone, and where runs that were
 /// not fitted are predicted better with it than without: those held out or, where there are none, each fitted run from the others. Otherwise the mismatch is
 /// unexplained, and the force is given that would explain it.
 ///

@@ -26,7 +26,7 @@ HeldoutResidual predict_heldout(const Arrival& arrival, const FitProblem& proble
   options.most_evaluations = 15;
   RunResidual& residual = joint.runs().front();
   residual.follow_in(arrival.joint.runs().front().finer());
-  residual.find_linear(joint.theta(0));
+  residual.find_linear(joint.theta(0), true);
   joint.solve(options);
   residual.reject_spikes(joint.theta(0));
   joint.solve(options);
