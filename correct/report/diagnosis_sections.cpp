@@ -87,7 +87,7 @@ void add_ranking(ReportPage& page, const json& ranking) {
   if (!rows.empty()) page.add_table("Ranking of the effects", {"effect", "score", "reduced chi-square", "change of BIC", "probability"}, rows, "The more negative the change of BIC, the more the effect explains for its parameters.");
 }
 
-void add_missing(ReportPage& page, const json& missing) {
+void add_missing(ReportPage& page, const json& missing, const std::string& title) {
   std::vector<std::vector<std::string>> rows;
   for (const json& m : missing) {
     const std::string effect = text_of(m, "effect");
@@ -95,7 +95,15 @@ void add_missing(ReportPage& page, const json& missing) {
     for (const json& p : member(m, "parameters", json::array()))
       rows.push_back({effect, text_of(p, "name"), with_error(number_of(p, "value"), number_of(p, "std_error")), text_of(p, "unit") == "1" ? "" : text_of(p, "unit")});
   }
-  if (!rows.empty()) page.add_table("Parameters of what was missing", {"effect", "parameter", "value ± one standard error", "unit"}, rows);
+  if (!rows.empty()) page.add_table(title, {"effect", "parameter", "value ± one standard error", "unit"}, rows);
+}
+
+/// The set of effects that comes closest where none is named.
+void add_closest(ReportPage& page, const json& closest) {
+  const json effects = member(closest, "effects", json::array());
+  if (effects.empty()) return;
+  page.add_text(fmt::format("The set that comes closest removes {:.0f} % of the excess, and is not named for it:", 100 * number_of(closest, "share_of_excess_removed")));
+  add_missing(page, effects, "Parameters of the set that comes closest");
 }
 
 /// What the rig's parameters would have been without the effect.
@@ -112,7 +120,8 @@ void add_improvement(ReportPage& page, const json& improvement) {
   std::vector<std::vector<std::string>> rows;
   for (const json& r : member(improvement, "runs", json::array())) {
     const double before = number_of(r, "rms_before"), after = number_of(r, "rms_after"), noise = number_of(r, "noise");
-    rows.push_back({file_name(text_of(r, "file")), member(r, "heldout", false).get<bool>() ? "held out" : "fitted", plain(before, 4), plain(after, 4), plain(noise, 4), text_of(r, "unit"),
+    const std::string channel = text_of(r, "channel");
+    rows.push_back({file_name(text_of(r, "file")) + (channel.empty() || channel == "gauge" ? "" : ", " + channel), member(r, "heldout", false).get<bool>() ? "held out" : "fitted", plain(before, 4), plain(after, 4), plain(noise, 4), text_of(r, "unit"),
                     plain(before / noise, 3), plain(after / noise, 3)});
   }
   if (rows.empty()) return;
@@ -266,13 +275,19 @@ void add_diagnosis(ReportPage& page, const json& result, const std::string& path
   add_verdicts(page, result, file_name(path));
   page.add_section("Diagnosis: " + file_name(path));
   add_places(page, result["mismatch"]);
-  add_missing(page, result["missing"]);
+  add_missing(page, result["missing"], "Parameters of what was missing");
+  add_closest(page, member(result, "closest", json::object()));
   add_ranking(page, member(result, "ranking", json::array()));
   const json improvement = member(result, "improvement", json::object());
   add_improvement(page, improvement);
   add_price(page, member(result, "price_of_ignorance", json::array()));
   const std::optional<Models> models = read_models(page, result, path, options);
-  for (const json& run : member(improvement, "runs", json::array())) add_run(page, result, run, models, path, options);
+  std::string drawn;  // a run has one entry for each of its channels
+  for (const json& run : member(improvement, "runs", json::array())) {
+    if (text_of(run, "file") == drawn && run.contains("channel")) continue;
+    add_run(page, result, run, models, path, options);
+    drawn = text_of(run, "file");
+  }
 }
 
 }  // namespace unrig
