@@ -17,13 +17,13 @@ namespace {
 using std::numbers::pi;
 using testing::HasSubstr;
 
-constexpr const char* head =
+constexpr const char* meta_data =
     "# unrig_run = 1\n# name = \"a \\\"run\\\"\"\n# kind = \"forced\"\n# medium = \"air\"\n# density = \"1.2 kg/m^3\"\n# speed = \"2 "
     "ft/s\"\n";
 
 TEST(RunText, ReadsBackAsTheSameRun) {
   const test::TemporaryDirectory directory;
-  const std::string text = std::string(head) +
+  const std::string text = std::string(meta_data) +
                            "# calibration = \"4.4 N/V\"\n"
                            "time [s],alpha [deg],gauge [mV],force [lbf],bath [degC],colour [bogus],weight\n"
                            "-0.001,1.25,100,1,20,3,1\n0.000,1.5,nan,2,21,4,0\n0.001,1.75,300,3,22,5,1\n";
