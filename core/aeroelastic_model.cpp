@@ -158,52 +158,7 @@ void keep_inputs(LinearSystem& system, const Conditions& conditions) {
   for (Feedback& f : system.feedback) f.sees.conservativeResizeLike(RowVectorXd::Zero(system.states()));  // states that came later
 }
 
-/// A run must have what its kind says drives the rig, and the rig must be able to answer to it.
-void check_kind(const Run& run, const Rig& rig) {
-  const auto refuse = [&](const std::string& found, const std::string& wanted) { throw InputError({run.file, run.header_line}, found, wanted, ""); };
-  if (run.kind == RunKind::step && rig.is_modal())
-    refuse("the run is a step of the angle", "wanted a pluck, a forced or a moved run: the rig " + rig.file + " is known only as modes, and has no section");
-  if (run.kind == RunKind::step && !run.find("alpha")) refuse("a step without a column \"alpha\"", "wanted the measured angle");
-  if (run.kind == RunKind::forced && !run.find("force")) refuse("a forced run without a column \"force\"", "wanted the measured force");
-  if (run.kind == RunKind::moved && !run.find("mount_velocity") && !run.find("mount_acceleration"))
-    refuse("a moved run without a column \"mount_velocity\" or \"mount_acceleration\"", "wanted the measured motion of the mount");
-}
-
-/// The gauge must read what the rig's gauge reads. Volts and counts will do for a free decay, whose amplitude is free.
-void check_gauge_unit(const Run& run, const Rig& rig) {
-  const Channel& gauge = run.channel("gauge");
-  const std::string wanted = rig.is_modal() ? rig.modal.front().gauge_unit : "N";
-  const bool raw = gauge.unit == "V" || gauge.unit == "1";
-  if (gauge.unit == wanted || (raw && run.kind == RunKind::pluck)) return;
-  throw InputError({run.file, run.header_line}, fmt::format("the column \"gauge\" is in {}", gauge.file_unit),
-                   fmt::format("wanted a unit of {}, which the gauge of the rig {} reads", wanted, rig.file),
-                   raw ? "Write the calibration into the meta data." : "Give the rig file of this run.");
-}
-
-/// Median of the first samples: the angle before the shaft moves.
-double first_angle(const VectorXd& alpha) {
-  std::vector<double> first;
-  constexpr std::size_t enough = 25;
-  for (const double x : alpha)
-    if (std::isfinite(x) && first.size() < enough) first.push_back(x);
-  if (first.empty()) return 0;
-  std::nth_element(first.begin(), first.begin() + static_cast<std::ptrdiff_t>(first.size() / 2), first.end());
-  return first[first.size() / 2];
-}
-
 }  // namespace
-
-Conditions conditions_of(const Run& run) {
-  Conditions c;
-  c.density = run.density;
-  c.speed = run.speed;
-  c.nyquist = run.dt > 0 ? 0.5 / run.dt : 0;
-  c.prescribed_pitch = run.find("alpha") != nullptr && run.kind == RunKind::step;
-  c.force = run.find("force") != nullptr;
-  c.mount = run.find("mount_velocity") != nullptr || run.find("mount_acceleration") != nullptr;
-  if (const Channel* alpha = run.find("alpha")) c.onset_angle = first_angle(alpha->value);
-  return c;
-}
 
 UndampedSystem undamped_system(const Rig& rig, const Basis& basis, double density) {
   const Kinematics k = kinematics(basis);
@@ -259,22 +214,6 @@ Index AeroelasticModel::circulation_parameter(Index k) const { return build_up_ 
 
 double AeroelasticModel::circulation_amplitude(const VectorXd& theta, Index k) const {
   return build_up_ == Circulation::free ? theta[beam_parameter_count + k] : circulation_.amplitude[k];
-}
-
-std::vector<std::string> AeroelasticModel::output_channels(const Run& run) const {
-  check_kind(run, rig_);
-  std::vector<std::string> channels;
-  if ((rig_.is_modal() || rig_.gauge_element > 0) && run.find("gauge")) channels.emplace_back("gauge");
-  std::string wanted = channels.empty() && (rig_.is_modal() || rig_.gauge_element > 0) ? "a column 'gauge'" : "";
-  for (const Sensor& sensor : rig_.sensors) {
-    if (run.find(sensor.column)) channels.push_back(sensor.column);
-    wanted += (wanted.empty() ? "a column '" : " or '") + sensor.column + "'";
-  }
-  if (channels.empty())
-    throw InputError({run.file, run.header_line}, "none of the columns belongs to this rig (" + rig_.file + ")", "wanted " + (wanted.empty() ? "a gauge or a sensor in the rig file" : wanted),
-                     "Give the rig file of this run, or add the gauge or [[sensor]] to it.");
-  if (channels.front() == "gauge") check_gauge_unit(run, rig_);
-  return channels;
 }
 
 LinearSystem AeroelasticModel::system(const Conditions& conditions, const VectorXd& theta, const std::vector<std::string>& channels) const {

@@ -1,19 +1,7 @@
+#include "core/effects/cubic_law.h"
 #include "core/effects/list.h"
 
 namespace unrig {
-
-namespace {
-
-/// -k_3 ((z + d)^3 - d^3)
-double cubic(double z, const double* p, double& slope, double* partial) {
-  const double k = p[0], d = p[1], shape = z * (z * z + 3 * z * d + 3 * d * d);
-  slope = -k * 3 * (z + d) * (z + d);
-  partial[0] = -shape;
-  partial[1] = -k * 3 * z * (z + 2 * d);
-  return -k * shape;
-}
-
-}  // namespace
 
 /// Stiffness of the fundamental mode that changes with amplitude: F = -k_3 ((h + d)^3 - d^3) on the coordinate of the first normal mode, scaled to the element that the dead weights
 /// hung at: h [m] is what that mode displaces it by from where it stood before the run, d how far that was from the unloaded position [m], of each run in a
@@ -30,7 +18,7 @@ Effect cubic_stiffness() {
   e.acts = [](const Conditions&) { return true; };
   e.apply = [](LinearSystem& system, const EffectContext& c) {
     const Eigen::RowVectorXd shape = first_mode(c.model, system.coordinates);
-    append_feedback(system, port(system, c.ports.coordinate, shape[0]), {displacement_of(system, shape), c.first_parameter, 2, cubic});
+    append_feedback(system, port(system, c.ports.coordinate, shape[0]), {displacement_of(system, shape), c.first_parameter, 2, cubic_law});
   };
   return e;
 }

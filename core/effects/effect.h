@@ -35,7 +35,7 @@ bool has(const Rig& rig, Needs needs);
 
 /// One candidate for missing physics (formats.md, section 5): what it is, where it can act, and how it changes the linear system of a run.
 ///
-/// To add one: a file in core/effects/ that defines it, and one line in core/effects/table.cpp. Fit and simulation pick it up from there.
+/// To add one: a file in core/effects/ that defines it, and a line each in core/effects/list.h and table.cpp. Fit and simulation pick it up from there.
 struct Effect {
   std::string id;
   std::string summary;   ///< one line

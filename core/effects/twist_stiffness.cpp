@@ -1,21 +1,9 @@
 #include <cmath>
 
+#include "core/effects/cubic_law.h"
 #include "core/effects/list.h"
 
 namespace unrig {
-
-namespace {
-
-/// -k_3 ((z + d)^3 - d^3)
-double cubic(double z, const double* p, double& slope, double* partial) {
-  const double k = p[0], d = p[1], shape = z * (z * z + 3 * z * d + 3 * d * d);
-  slope = -k * 3 * (z + d) * (z + d);
-  partial[0] = -shape;
-  partial[1] = -k * 3 * z * (z + 2 * d);
-  return -k * shape;
-}
-
-}  // namespace
 
 /// Torsional stiffness that changes with amplitude: M = -k_3 ((theta + d)^3 - d^3), theta the elastic twist [rad] of the section in the first torsional mode from where it stands
 /// at rest, d [rad] how far that is from the spring's point of symmetry, the same in all runs; k_3 [N m/rad^3], negative where the rig softens. The couple acts on that mode.
@@ -41,7 +29,7 @@ Effect twist_stiffness() {
     if (basis.torsion_modes < 1) return;
     const Eigen::Index first = basis.normal_modes;
     const double shape = basis.twist(c.model.rig().submerged.back() - 1, first);
-    append_feedback(system, port(system, c.ports.coordinate + first, shape), {displacement_of(system, shape * Eigen::RowVectorXd::Unit(system.coordinates, first)), c.first_parameter, 2, cubic});
+    append_feedback(system, port(system, c.ports.coordinate + first, shape), {displacement_of(system, shape * Eigen::RowVectorXd::Unit(system.coordinates, first)), c.first_parameter, 2, cubic_law});
   };
   return e;
 }
