@@ -2,16 +2,16 @@
 
 namespace unrig {
 
-/// Springs whose line of action passes beside the pitch axis: a displacement h [m] of the section makes the couple M = -k_c h, its twist theta [rad] the force F = -k_c theta;
+/// Springs whose line of action passes beside the pitch axis: a displacement h [m] of the section makes the couple M = -k_c h, its elastic twist theta [rad] the force F = -k_c theta;
 /// k_c [N/rad] is the normal stiffness times the arm. h is that of the first normal mode at the calibration element (without one, the first element), theta that of the first torsional
 /// mode at the outermost strip. Without a channel that reads the twist it hardly shows.
-/// Source: R. L. Bisplinghoff, H. Ashley, R. L. Halfman, Aeroelasticity (1955), chapter 9 (elastic axis and reference axis apart).
+/// Source: R. L. Bisplinghoff, H. Ashley, R. L. Halfman, Aeroelasticity (1955) (elastic axis and reference axis apart).
 Effect elastic_coupling() {
   Effect e;
   e.id = "elastic-coupling";
   e.summary = "springs that act beside the pitch axis";
   e.equation = "F = -k_c theta, M = -k_c h";
-  e.source = "Bisplinghoff, Ashley and Halfman, Aeroelasticity (1955), chapter 9";
+  e.source = "Bisplinghoff, Ashley and Halfman, Aeroelasticity (1955)";
   e.parameters = {{"stiffness", "N/rad", 0, -1e9, 1e9, false}};
   e.starts = {Eigen::VectorXd::Zero(1)};
   e.needs = Needs::twist_reading;

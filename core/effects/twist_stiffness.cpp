@@ -8,7 +8,7 @@ namespace unrig {
 /// Torsional stiffness that changes with amplitude: M = -k_3 ((theta + d)^3 - d^3), theta the elastic twist [rad] of the section in the first torsional mode from where it stands
 /// at rest, d [rad] how far that is from the spring's point of symmetry, the same in all runs; k_3 [N m/rad^3], negative where the rig softens. The couple acts on that mode.
 /// Without a channel that reads the twist it hardly shows.
-/// Source: B. H. K. Lee, S. J. Price, Y. S. Wong, Progress in Aerospace Sciences 35 (1999) 205, section 2 (cubic restoring forces in pitch).
+/// Source: B. H. K. Lee, S. J. Price, Y. S. Wong, Progress in Aerospace Sciences 35 (1999) 205 (cubic restoring forces in pitch).
 Effect twist_stiffness() {
   Effect e;
   e.id = "twist-stiffness";

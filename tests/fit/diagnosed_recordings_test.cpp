@@ -45,7 +45,7 @@ TEST(DiagnosedRecordings, ShipRollHasQuadraticDampingAndNonlinearStiffness) {
   EXPECT_LT(d.runs.front().rms_after, 0.0186 * degree);
 }
 
-/// Electronic resonator whose restoring voltage has a cubic term by design. A linear model leaves 6.8 to 7.5 mV, the right one 0.90 mV; so does what was not fitted.
+/// Electronic resonator. A linear model leaves 6.8 to 7.5 mV, the right one 0.90 mV; so does what was not fitted.
 TEST(DiagnosedRecordings, OscillatorHasCubicStiffness) {
   UNRIG_NEEDS_SHARED("real/oscillator/multisine.csv");
   DiagnoseProblem problem = recording("oscillator", "multisine.csv");
@@ -70,12 +70,12 @@ TEST(DiagnosedRecordings, PendulumHasDryFriction) {
   problem.runs = {parted(problem.runs.front(), sticks).first};
   const Diagnosis d = diagnose(problem);
   EXPECT_THAT(names(d.missing), Contains("coulomb-friction"));
-  EXPECT_TRUE(d.unexplained) << "the encoder resolves a tenth of what is left";
+  EXPECT_TRUE(d.unexplained) << "the encoder's noise is a tenth of what is left";
   EXPECT_GT(d.runs.front().rms_before, 3.8e-3);
   EXPECT_LT(d.runs.front().rms_after, 0.94e-3);
 }
 
-/// Wing section on springs, heave and pitch. Its builders describe the pitch springs as hardening and not symmetric; 14.9 mrad without, 2.8 to 3.7 mrad with the right terms. What is
+/// Wing section on springs, heave and pitch: 14.9 mrad without, 2.8 to 3.7 mrad with the right terms. What is
 /// left still is a hundred times the converter's noise, and so the set that comes closest is reported without being named.
 TEST(DiagnosedRecordings, WingSectionHasNonlinearPitchSprings) {
   UNRIG_NEEDS_SHARED("real/flutter_rig/free_decay_1.csv");
