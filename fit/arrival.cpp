@@ -281,7 +281,7 @@ bool back_to_the_rig(JointProblem& joint, double factor) {
   for (Unknown& u : joint.unknowns()) {
     const double there = rig[u.parameter];
     const bool near = u.value > there / factor && u.value < factor * there;
-    if (u.held || !(there > 0) || near || belongs_to_an_effect(joint.parameter(u).name)) continue;
+    if (u.held || u.run >= 0 || !(there > 0) || near || belongs_to_an_effect(joint.parameter(u).name)) continue;
     u.value = there;
     any = true;
   }

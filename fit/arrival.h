@@ -50,6 +50,7 @@ void refine(Arrival& arrival, const FitProblem& problem);
 bool belongs_to_an_effect(const std::string& parameter);
 
 /// A fit that cannot follow leaves parameters far from the truth: the rig's own that are further than `factor` from their first values go back there. Whether any did.
+/// A parameter of a single run (the normal-force slope, which falls to half in stall) stays.
 bool back_to_the_rig(JointProblem& joint, double factor);
 
 /// The unknowns that belong to effect `id`.

@@ -275,16 +275,22 @@ class Decays {
   Index samples_ = 0;
 };
 
-/// From theta and c of `start`, with a law whose corners bend a trajectory so often that only records that grow lead to it, if any do. Infinite, and `joint` as it
-/// was, where that does not follow the decays.
-double follow_round_corners(JointProblem& joint, const GrowingTrust& start) {
-  constexpr double lost = 4, growth = 1.15;
-  JointProblem tried = start.joint();
-  Decays decays(tried, start.linear());
-  const double left = decays.search(growth, lost) ? decays.settle() : INFINITY;
-  if (!(left < followed)) return INFINITY;
-  joint = std::move(tried);
-  return left;
+/// What one search leaves of the decays, and where it ended.
+struct Followed {
+  JointProblem joint;
+  double left = INFINITY;
+};
+
+/// From theta and c of `start`, with a law whose corners bend a trajectory so often that only records that grow lead to it, if any do: the slower, the surer. Infinite
+/// where that loses the decays.
+Followed follow_round_corners(const GrowingTrust& start) {
+  constexpr double lost = 4;
+  std::vector<Followed> tried(2, {start.joint()});
+  in_parallel(tried.size(), [&](std::size_t i) {
+    Decays decays(tried[i].joint, start.linear());
+    if (decays.search(i == 0 ? 1.15 : 1.07, lost)) tried[i].left = decays.settle();
+  });
+  return std::move(tried[0].left < tried[1].left ? tried[0] : tried[1]);
 }
 
 /// From theta and c of `start`: over the whole records and, where that does not follow them, over records that grow. Leaves the better in `joint`.
@@ -337,12 +343,18 @@ DecaysLeft fit_decays(JointProblem& joint, const std::string& id) {
 
   if (takes_small_steps(joint)) {
     std::unique_ptr<GrowingTrust> best = trust(1, GrowingTrust::first_levels);
-    if (const double left = follow_round_corners(joint, *best); std::isfinite(left)) return {left, true};
-    if (size != 0)
-      if (auto other = better_of_other_sizes(GrowingTrust::first_levels); other->better_than(*best)) {
-        best = std::move(other);
-        if (const double left = follow_round_corners(joint, *best); std::isfinite(left)) return {left, true};
+    Followed found = follow_round_corners(*best);
+    if (!(found.left < followed) && size != 0)
+      for (const double factor : {0.2, 5.0}) {
+        auto other = trust(factor, GrowingTrust::first_levels);
+        if (Followed others = follow_round_corners(*other); others.left < found.left) found = std::move(others);
+        if (other->better_than(*best)) best = std::move(other);
       }
+    constexpr double nearly_followed = 1.5;  // trajectories that cross the corners for seconds have least chi-squares everywhere; few are the deepest
+    if (found.left < nearly_followed) {
+      joint = std::move(found.joint);
+      return {found.left, true};
+    }
     best->fit(GrowingTrust::trusted_levels);
     joint = best->joint();
     std::size_t d = 0;

@@ -3,7 +3,7 @@
 
   python3 sample_data/trials.py trial_1.json trial_2.json ... > TRIAL.md
 
-Size: r.m.s. of what the hidden effect does to the run that it changes most, over the noise. Right: exactly what was hidden was named, or nothing where nothing
+Size: r.m.s. of what the hidden effect does to the run that it changes most, over the noise; of two, each beside the bare rig, the smaller one. Right: exactly what was hidden was named, or nothing where nothing
 was. As good: another set was named and the hidden one was reported with it, as one that these recordings cannot tell from it.
 """
 import collections
@@ -23,6 +23,8 @@ def kind(trial):
         return "right"
     if sorted(trial["hidden"]) in [sorted(other) for other in trial["equivalent"]]:
         return "as good"
+    if trial["found"] and set(trial["found"]) < set(trial["hidden"]):
+        return "one of two"
     if trial["found"]:
         return "wrong"
     return "unexplained" if trial["unexplained"] else "missed"
@@ -32,13 +34,18 @@ def share(part, whole):
     return f"{part} of {whole} ({100 * part / whole:.1f} %)" if whole else "0 of 0"
 
 
+def size(trial):
+    """Of the smallest of what is hidden."""
+    return min(trial.get("sizes") or [trial["size"]])
+
+
 def nine_in_ten(trials):
     """Smallest size from which on upwards nine in ten are right."""
     smallest, right = None, 0
-    for count, t in enumerate(sorted(trials, key=lambda t: -t["size"]), 1):
+    for count, t in enumerate(sorted(trials, key=lambda t: -size(t)), 1):
         right += t["right"]
         if t["right"] and 10 * right >= 9 * count:
-            smallest = t["size"]
+            smallest = size(t)
     return f"{smallest:.2g}" if smallest else "-"
 
 
@@ -46,25 +53,27 @@ def main():
     results = [json.loads(pathlib.Path(name).read_text()) for name in sys.argv[1:]]
     trials = [t for r in results for t in r["trials"]]
     nulls, hidden = [t for t in trials if not t["hidden"]], [t for t in trials if t["hidden"]]
-    visible = [t for t in hidden if t["size"] >= VISIBLE]
+    visible = [t for t in hidden if size(t) >= VISIBLE]
     kinds = collections.Counter(kind(t) for t in visible)
     print(f"{len(trials)} campaigns (seeds {', '.join(str(r['seed']) for r in results)}), noise {results[0]['noise']['gauge']} {results[0]['noise']['unit']}\n")
     print(f"- nothing hidden: {share(sum(not t['right'] or t['unexplained'] for t in nulls), len(nulls))} false alarms")
-    print(f"- something hidden, size {VISIBLE} or more: " + "; ".join(f"{k} {share(kinds[k], len(visible))}" for k in ("right", "as good", "wrong", "unexplained", "missed", "failed") if kinds[k]))
+    print(f"- something hidden, size {VISIBLE} or more: " + "; ".join(f"{k} {share(kinds[k], len(visible))}" for k in ("right", "as good", "one of two", "wrong", "unexplained", "missed", "failed") if kinds[k]))
     seconds = sorted(t["seconds"] for t in trials)
     print(f"- a diagnosis took {seconds[len(seconds) // 2]:.1f} s in the median, {seconds[int(0.95 * len(seconds))]:.0f} s or less in 95 of 100, {seconds[-1]:.0f} s at most (two at a time, two cores)\n")
-    columns = ["right", "as good", "wrong", "unexplained", "missed", "failed"]
+    columns = ["right", "as good", "one of two", "wrong", "unexplained", "missed", "failed"]
+    if all(len(t["hidden"]) < 2 for t in trials):
+        columns.remove("one of two")
     print(f"| hidden | campaigns | size {VISIBLE} or more | " + " | ".join(columns) + " | nine in ten from size | wrong names |")
     print("| --- " * (len(columns) + 5) + "|")
     for name in sorted({" + ".join(sorted(t["hidden"])) for t in hidden}):
         own = [t for t in hidden if " + ".join(sorted(t["hidden"])) == name]
-        seen = [t for t in own if t["size"] >= VISIBLE]
+        seen = [t for t in own if size(t) >= VISIBLE]
         count = collections.Counter(kind(t) for t in seen)
         wrong = sorted({" + ".join(sorted(t["found"])) for t in seen if kind(t) == "wrong"})
         print(f"| {name} | {len(own)} | {len(seen)} | " + " | ".join(str(count[c]) for c in columns) + f" | {nine_in_ten(own)} | {', '.join(wrong)} |")
     print("\n| size | campaigns | " + " | ".join(columns) + " |\n" + "| --- " * (len(columns) + 2) + "|")
     for low, high in zip(BINS, BINS[1:]):
-        own = [t for t in hidden if low <= t["size"] < high]
+        own = [t for t in hidden if low <= size(t) < high]
         count = collections.Counter(kind(t) for t in own)
         print(f"| {low:g} to {high:g} | {len(own)} | " + " | ".join(f"{100 * count[c] / len(own):.0f} %" if own else "-" for c in columns) + " |")
 

@@ -169,6 +169,13 @@ double excess(const Trial& trial) {
   return power / count;
 }
 
+/// Whether decays that decide are followed, to the noise or in nearly all that they had above it.
+bool follows_decays(const Trial& trial, const Trial& baseline) {
+  if (!decays_decide(trial) || excess(trial) > half * excess(baseline)) return false;
+  const bool nearly = trial.decays.exactly && left_of_decays(trial) - 1 < (1 - enough_to_name) * (left_of_decays(baseline) - 1);
+  return trial.decays.chi2 < explained || nearly;
+}
+
 /// exp(-BIC/2) over the sum of it over all.
 void give_probabilities(std::vector<Candidate>& ranking) {
   double least = 0, sum = 0;
@@ -289,8 +296,7 @@ Diagnosis diagnose(const DiagnoseProblem& problem) {
   const bool clean = !d.remaining.found;
   const std::vector<ImprovedRun> unseen = problem.verdict_only ? std::vector<ImprovedRun>{} : predict_unseen(problem, fit_problem, baseline.arrival, best);
   const bool predicts = best.effects.empty() || power_over_noise(unseen, &ImprovedRun::rms_after) <= power_over_noise(unseen, &ImprovedRun::rms_before);
-  const bool follows_decays = decays_decide(best) && best.decays.chi2 < explained && excess(best) < half * excess(baseline);
-  const bool named = !best.effects.empty() && predicts && (clean || follows_decays || excess(best) < (1 - enough_to_name) * excess(baseline));
+  const bool named = !best.effects.empty() && predicts && (clean || follows_decays(best, baseline) || excess(best) < (1 - enough_to_name) * excess(baseline));
   d.unexplained = d.mismatch.found && !(clean && predicts);
 
   if (!problem.verdict_only) {

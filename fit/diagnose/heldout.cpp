@@ -1,5 +1,6 @@
 #include "fit/diagnose/heldout.h"
 
+#include <algorithm>
 #include <cmath>
 
 #include "fit/undetermined.h"
@@ -9,6 +10,22 @@ namespace unrig {
 using Eigen::Index;
 using Eigen::VectorXd;
 
+namespace {
+
+/// Of a parameter of all runs its value; of one of a single run (the slope of the normal force) that of the run that began at the angle nearest to `onset`.
+double nearest_value(const JointProblem& fitted, const Unknown& wanted, double onset) {
+  double value = wanted.value, nearest = INFINITY;
+  for (const Unknown& known : fitted.unknowns()) {
+    if (known.parameter != wanted.parameter || (known.run < 0) != (wanted.run < 0)) continue;
+    const double away = known.run < 0 ? 0 : std::abs(fitted.runs()[static_cast<std::size_t>(known.run)].conditions().onset_angle - onset);
+    if (away < nearest) value = known.value;
+    nearest = std::min(nearest, away);
+  }
+  return value;
+}
+
+}  // namespace
+
 HeldoutResidual predict_heldout(const Arrival& arrival, const FitProblem& problem, const Run& run) {
   const auto windows = problem.rig.is_modal() ? std::vector<MotionBasis::Window>{} : motion_windows(run);
   std::vector<RunResidual> one;
@@ -16,8 +33,7 @@ HeldoutResidual predict_heldout(const Arrival& arrival, const FitProblem& proble
   JointProblem joint(*arrival.model, std::move(one));
   for (Unknown& u : joint.unknowns()) {
     u.held = u.run < 0;
-    for (const Unknown& known : arrival.joint.unknowns())
-      if (known.parameter == u.parameter && (known.run == u.run || u.run >= 0)) u.value = known.value;
+    u.value = nearest_value(arrival.joint, u, joint.runs().front().conditions().onset_angle);
   }
   JointProblem::SolveOptions options;
   options.iterations = 12;

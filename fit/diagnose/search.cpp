@@ -122,18 +122,6 @@ void measure(Trial& trial) {
   for (const Unknown& u : joint.unknowns()) trial.variables += u.held ? 0 : 1;
 }
 
-/// Residual power over noise power of the runs whose motion is not estimated.
-double left_of_decays(const Trial& trial) {
-  double power = 0, count = 0;
-  for (std::size_t r = 0; r < trial.variance.size(); ++r) {
-    const RunResidual& run = trial.arrival.joint.runs()[r];
-    if (run.motion().unknowns() > 0) continue;
-    power += static_cast<double>(run.run().samples()) * trial.variance[r];
-    count += static_cast<double>(run.run().samples());
-  }
-  return power / count;
-}
-
 /// Whether an effect is a nonlinear law in any of the runs.
 bool is_a_law(const std::string& id, const AeroelasticModel& rig, const JointProblem& joint) {
   const AeroelasticModel model = rig.with_effects({id});
@@ -213,6 +201,17 @@ Trial prepare(const FitProblem& problem, const Trial& base, const std::vector<st
 void fit_fully(Trial& trial, int rounds) {
   anneal(trial.arrival, rounds);
   measure(trial);
+}
+
+double left_of_decays(const Trial& trial) {
+  double power = 0, count = 0;
+  for (std::size_t r = 0; r < trial.variance.size(); ++r) {
+    const RunResidual& run = trial.arrival.joint.runs()[r];
+    if (run.motion().unknowns() > 0) continue;
+    power += static_cast<double>(run.run().samples()) * trial.variance[r];
+    count += static_cast<double>(run.run().samples());
+  }
+  return power / count;
 }
 
 bool decays_decide(const Trial& trial) { return takes_small_steps(trial.arrival.joint) && has_decays(trial.arrival.joint); }

@@ -41,6 +41,9 @@ Trial fit_baseline(const FitProblem& problem);
 /// One linear step from `base` with `effects` (those of base and one more): what would it remove?
 Trial prepare(const FitProblem& problem, const Trial& base, const std::vector<std::string>& effects);
 
+/// Residual power over noise power of the runs whose motion is not estimated.
+double left_of_decays(const Trial& trial);
+
 /// Whether following the model takes several steps a sample (freeplay): what the free decays say of theta then stands, because the least chi-squares of the other
 /// runs in their motion, many and near each other, mislead a search.
 bool decays_decide(const Trial& trial);

@@ -45,6 +45,7 @@ TrialOutcome run_trial(const TrialProblem& problem, const Strings& effects, std:
     const TrialCampaign campaign = draw_campaign(problem.rig, outcome.hidden, problem.noise, random);
     outcome.parameters = campaign.parameters;
     outcome.size = campaign.size;
+    outcome.sizes = campaign.sizes;
     DiagnoseProblem diagnosis;
     diagnosis.rig = campaign.rig;
     diagnosis.runs = campaign.runs;
@@ -68,12 +69,14 @@ EffectScore score_of(const std::string& id, const std::vector<TrialOutcome>& out
   EffectScore score;
   std::vector<std::pair<double, bool>> by_size;
   for (const TrialOutcome& o : outcomes) {
-    if (!has(o.hidden, id)) continue;
+    const auto place = static_cast<std::size_t>(std::find(o.hidden.begin(), o.hidden.end(), id) - o.hidden.begin());
+    if (place == o.hidden.size()) continue;
     ++score.hidden;
     const bool found = has(o.found, id);
-    if (found && (score.found++ == 0 || o.size < score.smallest_found)) score.smallest_found = o.size;
+    const double size = place < o.sizes.size() ? o.sizes[place] : 0;  // a campaign that failed to be drawn has none
+    if (found && (score.found++ == 0 || size < score.smallest_found)) score.smallest_found = size;
     if (!found && std::any_of(o.equivalent.begin(), o.equivalent.end(), [&](const Strings& set) { return has(set, id); })) ++score.equivalent;
-    by_size.emplace_back(o.size, found);
+    by_size.emplace_back(size, found);
   }
   std::sort(by_size.rbegin(), by_size.rend());
   int there = 0, found = 0;
@@ -141,7 +144,7 @@ std::string to_json(const TrialResult& r) {
   using nlohmann::ordered_json;
   ordered_json trials = ordered_json::array(), scores = ordered_json::array();
   for (const TrialOutcome& o : r.outcomes) {
-    ordered_json one = {{"hidden", o.hidden}, {"parameters", o.parameters}, {"size", o.size}, {"found", o.found}, {"equivalent", o.equivalent}, {"mismatch", o.mismatch},
+    ordered_json one = {{"hidden", o.hidden}, {"parameters", o.parameters}, {"size", o.size}, {"sizes", o.sizes}, {"found", o.found}, {"equivalent", o.equivalent}, {"mismatch", o.mismatch},
                         {"unexplained", o.unexplained}, {"right", o.right()}, {"seconds", o.seconds}};
     if (!o.failure.empty()) one["failure"] = o.failure;
     trials.push_back(one);

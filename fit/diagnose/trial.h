@@ -26,6 +26,7 @@ struct TrialOutcome {
   std::vector<std::vector<std::string>> equivalent;  ///< sets that the diagnosis cannot tell from what it found
   std::vector<double> parameters;
   double size = 0;             ///< largest r.m.s. of a run that the hidden effects make, over the noise
+  std::vector<double> sizes;   ///< of each hidden effect by itself, in the order of `hidden`
   bool mismatch = false, unexplained = false;
   double seconds = 0;
   std::string failure;         ///< what the diagnosis threw, if it did

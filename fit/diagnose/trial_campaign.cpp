@@ -117,6 +117,29 @@ VectorXd white_noise(Index samples, Random& random) {
   return VectorXd::NullaryExpr(samples, [&] { return normal(random); });
 }
 
+/// The rig with one of the hidden effects at work, and what it is told from.
+struct Alone {
+  AeroelasticModel known, with;
+  VectorXd theta;  // of `with`; it begins with that of `known`
+};
+
+Alone beside_the_rig(const std::string& id, const AeroelasticModel& known, const AeroelasticModel& bare, const AeroelasticModel& all, const VectorXd& theta) {
+  Alone alone{known, bare.with_effects({id}), {}};
+  alone.theta = alone.with.start_values();
+  for (Index k = 0; k < alone.theta.size(); ++k) alone.theta[k] = theta[all.index(alone.with.parameters()[static_cast<std::size_t>(k)].name)];
+  return alone;
+}
+
+/// What it does to the gauge in one run, r.m.s.; its signals begin at `first` of `signals`, which moves on to the next effect's.
+double trace_of(const Alone& effect, const Planned& planned, const VectorXd& signals, Index& first) {
+  SimulateProblem problem = problem_of(effect.with, effect.theta, planned);
+  const auto own = static_cast<Index>(effect.with.system(conditions_of(problem.run), problem.theta, {"gauge"}).exogenous.size());
+  problem.signals = signals.segment(first, own);
+  first += own;
+  const VectorXd theta = effect.theta.head(effect.known.start_values().size());
+  return rms(gauge(problem) - gauge(problem_of(effect.known, theta, planned)));
+}
+
 }  // namespace
 
 void check_for_trials(const Rig& rig) {
@@ -146,6 +169,7 @@ TrialCampaign draw_campaign(const Rig& rig, const std::vector<std::string>& hidd
   check_for_trials(rig);
   TrialCampaign campaign;
   campaign.hidden = hidden;
+  campaign.sizes.assign(hidden.size(), 0);
   campaign.rig = rig;
   campaign.rig.normal.modes = 0;
   const Rig whole = campaign.rig;
@@ -153,7 +177,7 @@ TrialCampaign draw_campaign(const Rig& rig, const std::vector<std::string>& hidd
   // Of hidden modes the trace is what the truth has beside a rig of one.
   const bool modes_hidden = std::find(hidden.begin(), hidden.end(), "higher-mode") != hidden.end();
   if (modes_hidden) campaign.rig.normal.modes = 1;
-  const AeroelasticModel known = modes_hidden ? AeroelasticModel(whole, make_basis(whole, Index{1}, bare.basis().torsion_modes), bare.circulation()) : bare;
+  const AeroelasticModel one_mode(whole, make_basis(whole, Index{1}, bare.basis().torsion_modes), bare.circulation()), &known = modes_hidden ? one_mode : bare;
 
   const std::vector<Planned> runs = plan(random);
   const VectorXd rig_theta = draw_rig(bare, random);
@@ -166,6 +190,9 @@ TrialCampaign draw_campaign(const Rig& rig, const std::vector<std::string>& hidd
     campaign.parameters.insert(campaign.parameters.end(), p.begin(), p.end());
     first += p.size();
   }
+
+  std::vector<Alone> alone;
+  for (const std::string& id : hidden) alone.push_back(beside_the_rig(id, id == "higher-mode" ? one_mode : bare, bare, model, theta));
 
   std::vector<SimulateProblem> problems;
   std::vector<VectorXd> without;
@@ -190,6 +217,8 @@ TrialCampaign draw_campaign(const Rig& rig, const std::vector<std::string>& hidd
   for (std::size_t r = 0; r < problems.size(); ++r) {
     Run fine = simulate(problems[r]).run;
     if (!hidden.empty()) campaign.size = std::max(campaign.size, rms(fine.channel("gauge").value - without[r]) / noise);
+    Index first_signal = 0;
+    for (std::size_t k = 0; k < alone.size(); ++k) campaign.sizes[k] = std::max(campaign.sizes[k], trace_of(alone[k], runs[r], problems[r].signals, first_signal) / noise);
     std::erase_if(fine.channels, [](const Channel& c) { return c.name != "alpha" && c.name != "gauge"; });
     Run recorded = every_nth(fine, finer);
     for (Channel& c : recorded.channels) c.value += (c.name == "alpha" ? angle_noise : noise) * white_noise(c.value.size(), random);

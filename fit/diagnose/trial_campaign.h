@@ -15,6 +15,7 @@ struct TrialCampaign {
   std::vector<std::string> hidden;
   std::vector<double> parameters;  ///< of the hidden effects, one after the other
   double size = 0;                 ///< what they change in the gauge: the largest r.m.s. of a run, over the noise
+  std::vector<double> sizes;       ///< the same of each beside the bare rig, in the order of `hidden`
 };
 
 /// Draws one: a pluck in air, one in water, and three steps at two speeds from 2, 4 and 25 degrees. Stiffness, damping, apparent mass and lift slopes are drawn around
