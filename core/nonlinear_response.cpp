@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/feedback_force.h"
 #include "core/small_product.h"
 
 namespace unrig {
@@ -29,10 +30,10 @@ class Laws {
     force = slope = Few<M>::Zero(count);
   }
   void at(const Few<M>& z) {
-    double partial[most_law_parameters] = {};
     for (Index i = 0; i < z.size(); ++i) {
-      const Feedback& f = system_.feedback[static_cast<std::size_t>(i)];
-      force[i] = f.law(z[i], theta_.data() + f.first_parameter, slope[i], partial);
+      const FeedbackForce f = force_of(system_.feedback[static_cast<std::size_t>(i)], z[i], theta_);
+      force[i] = f.value;
+      slope[i] = f.slope;
     }
   }
   /// d force / d theta at z, feedbacks x P.
@@ -40,15 +41,13 @@ class Laws {
     partials.setZero();
     for (Index i = 0; i < z.size(); ++i) {
       const Feedback& f = system_.feedback[static_cast<std::size_t>(i)];
-      double ignored = 0, partial[most_law_parameters] = {};
-      f.law(z[i], theta_.data() + f.first_parameter, ignored, partial);
-      for (Index k = 0; k < f.parameters; ++k) partials(i, f.first_parameter + k) = partial[k];
+      const FeedbackForce at_z = force_of(f, z[i], theta_);
+      for (Index k = 0; k < f.parameters; ++k) partials(i, f.first_parameter + k) = at_z.partial[static_cast<std::size_t>(k)];
     }
   }
   Few<M> force, slope;
 
  private:
-  static constexpr int most_law_parameters = 8;
   const LinearSystem& system_;
   const VectorXd& theta_;
 };

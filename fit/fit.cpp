@@ -8,7 +8,7 @@
 
 #include "fit/arrival.h"
 #include "fit/decays_first.h"
-#include "fit/diagnose/search.h"
+#include "fit/effect_search.h"
 #include "fit/fit_description.h"
 #include "fit/gauss_newton.h"
 #include "fit/uncertainty.h"

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <utility>
 
+#include "core/feedback_force.h"
 #include "core/run_inputs.h"
 
 namespace unrig {
@@ -97,14 +98,14 @@ void LawSmoother::look_at_laws(const VectorXd& theta) {
     offset_ = VectorXd::Zero(channels_);
     return;
   }
-  constexpr int most_law_parameters = 8;
   for (Index k = 0; k < samples_; ++k)
     for (Index i = 0; i < laws_; ++i) {
       const Feedback& f = system_.feedback[static_cast<std::size_t>(i)];
-      double partial[most_law_parameters] = {};
-      force_(i, k) = f.law(sees_.row(i).dot(state_.col(k)), theta.data() + f.first_parameter, slope_(i, k), partial);
+      const FeedbackForce at_z = force_of(f, sees_.row(i).dot(state_.col(k)), theta);
+      force_(i, k) = at_z.value;
+      slope_(i, k) = at_z.slope;
       for (Index a = 0; a < changes_; ++a)
-        if (const Index own = parameters_[static_cast<std::size_t>(a)] - f.first_parameter; own >= 0 && own < f.parameters) law_partial_(i, k * changes_ + a) = partial[own];
+        if (const Index own = parameters_[static_cast<std::size_t>(a)] - f.first_parameter; own >= 0 && own < f.parameters) law_partial_(i, k * changes_ + a) = at_z.partial[static_cast<std::size_t>(own)];
     }
 }
 

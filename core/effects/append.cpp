@@ -2,6 +2,9 @@
 
 #include <algorithm>
 #include <numbers>
+#include <stdexcept>
+
+#include "core/feedback_force.h"
 
 namespace unrig {
 namespace {
@@ -49,6 +52,7 @@ void append_strip_signal(LinearSystem& system, const EffectContext& c, const Dua
 }
 
 void append_feedback(LinearSystem& system, const DualMatrix& direction, Feedback feedback) {
+  if (feedback.parameters > most_law_parameters) throw std::logic_error("a law with more parameters than core/feedback_force.h has room for");
   for (DualMatrix* m : {&system.B, &system.D}) {
     const DualMatrix push = *m * direction;
     const Index columns = m->cols();

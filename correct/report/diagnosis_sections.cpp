@@ -102,7 +102,7 @@ void add_missing(ReportPage& page, const json& missing, const std::string& title
 void add_closest(ReportPage& page, const json& closest) {
   const json effects = member(closest, "effects", json::array());
   if (effects.empty()) return;
-  page.add_text(fmt::format("The set that comes closest removes {:.0f} % of the excess, and is not named for it:", 100 * number_of(closest, "share_of_excess_removed")));
+  page.add_text(fmt::format("The set that comes closest removes {:.0f} % of the excess, {}:", 100 * number_of(closest, "share_of_excess_removed"), text_of(closest, "not_named")));
   add_missing(page, effects, "Parameters of the set that comes closest");
 }
 

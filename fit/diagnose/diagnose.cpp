@@ -12,7 +12,7 @@
 #include "core/in_parallel.h"
 #include "fit/decays_first.h"
 #include "fit/diagnose/heldout.h"
-#include "fit/diagnose/search.h"
+#include "fit/effect_search.h"
 #include "fit/fit_description.h"
 
 namespace unrig {
@@ -176,6 +176,14 @@ bool follows_decays(const Trial& trial, const Trial& baseline) {
   return trial.decays.chi2 < explained || nearly;
 }
 
+/// `best` has effects; `clean`: beside them no significant mismatch remains.
+Naming naming_of(const Trial& best, const Trial& baseline, bool clean, bool predicts) {
+  if (!predicts) return Naming::does_not_predict;
+  if (clean || follows_decays(best, baseline)) return Naming::named;
+  if (excess(best) > (1 - enough_to_name) * excess(baseline)) return Naming::removes_too_little;
+  return only_signals(best) ? Naming::only_signals : Naming::named;
+}
+
 /// exp(-BIC/2) over the sum of it over all.
 void give_probabilities(std::vector<Candidate>& ranking) {
   double least = 0, sum = 0;
@@ -296,7 +304,6 @@ Diagnosis diagnose(const DiagnoseProblem& problem) {
   const bool clean = !d.remaining.found;
   const std::vector<ImprovedRun> unseen = problem.verdict_only ? std::vector<ImprovedRun>{} : predict_unseen(problem, fit_problem, baseline.arrival, best);
   const bool predicts = best.effects.empty() || power_over_noise(unseen, &ImprovedRun::rms_after) <= power_over_noise(unseen, &ImprovedRun::rms_before);
-  const bool named = !best.effects.empty() && predicts && (clean || follows_decays(best, baseline) || excess(best) < (1 - enough_to_name) * excess(baseline));
   d.unexplained = d.mismatch.found && !(clean && predicts);
 
   if (!problem.verdict_only) {
@@ -305,12 +312,11 @@ Diagnosis diagnose(const DiagnoseProblem& problem) {
     for (const ImprovedRun& run : unseen) d.runs.push_back(run);
     if (d.unexplained) d.missing_force = missing_forces(best.arrival.joint);
   }
-  if (named) {
-    d.missing = effects_of(best, d);
-    name_equivalent(baseline, best, all_tried, problem.verdict_only, d);
-  } else if (!best.effects.empty()) {
-    d.closest = effects_of(best, d);
-    d.removed_by_closest = 1 - excess(best) / excess(baseline);
+  if (!best.effects.empty()) {
+    d.naming = naming_of(best, baseline, clean, predicts);
+    if (d.naming == Naming::named) name_equivalent(baseline, best, all_tried, problem.verdict_only, d);
+    else d.removed_by_closest = 1 - excess(best) / excess(baseline);
+    (d.naming == Naming::named ? d.missing : d.closest) = effects_of(best, d);
   }
   d.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
   return d;

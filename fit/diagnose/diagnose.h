@@ -17,6 +17,9 @@ namespace unrig {
 
 constexpr double enough_to_name = 0.97;  ///< share of the excess that effects must remove to be named where something remains
 
+/// Why the best set of effects is named or not.
+enum class Naming { named, removes_too_little, only_signals, does_not_predict };
+
 /// Where do these recordings and the model of their rig differ, and which physics was left out?
 struct DiagnoseProblem {
   Rig rig;
@@ -60,6 +63,7 @@ struct Diagnosis {
   bool unexplained = false;            ///< a significant mismatch remains
   std::vector<MissingEffect> closest;  ///< where nothing is named: the best set that was tried
   double removed_by_closest = 0;       ///< share of the excess
+  Naming naming = Naming::named;       ///< and why it is not named
   Mismatch remaining;                  ///< and where it sits
   double bic_before = 0, bic_after = 0;
   std::vector<ImprovedRun> runs;
@@ -75,9 +79,9 @@ struct Diagnosis {
 /// 3. The promising ones are fitted in full, everything free, while the weights return to those of the noise. They are compared by BIC with each run's
 ///    own variance and with as many samples as the remaining colour leaves independent.
 /// 4. While a mismatch remains a further effect is tried beside the best; an effect that others made superfluous is taken away again.
-/// An effect is named only where no significant mismatch remains beside the set it belongs to, or nearly all of the excess is gone, and where runs that were
-/// not fitted are predicted better with it than without: those held out or, where there are none, each fitted run from the others. Otherwise the mismatch is
-/// unexplained, and the force is given that would explain it.
+/// An effect is named only where no significant mismatch remains beside the set it belongs to, or nearly all of the excess is gone (which is not enough for signals
+/// with amplitudes of their own in every run), and where runs that were not fitted are predicted better with it than without: those held out or, where there are
+/// none, each fitted run from the others. Otherwise the mismatch is unexplained, and the force is given that would explain it.
 ///
 /// Throws InputError where a run does not belong to the rig.
 Diagnosis diagnose(const DiagnoseProblem& problem);

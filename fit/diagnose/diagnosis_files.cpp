@@ -54,6 +54,16 @@ std::string cannot_tell(const std::vector<std::string>& set, const std::optional
   return text + fmt::format("A recording that would: {} (the two would differ by {:.2g} times the noise; in the run as recorded, by {:.2g}).", by->what, by->difference, by->now);
 }
 
+std::string why_not_named(Naming naming) {
+  switch (naming) {
+    case Naming::removes_too_little: return "too little to be named";
+    case Naming::only_signals: return "but leaves a mismatch, and its amplitudes are free in every run: they take a share of anything at these frequencies";
+    case Naming::does_not_predict: return "but does not predict runs that were not fitted";
+    case Naming::named: break;
+  }
+  return "";
+}
+
 std::string verdict(const Diagnosis& d) {
   if (!d.mismatch.found) return "Nothing is missing: " + d.mismatch.summary + ".";
   if (d.missing.empty()) return "There is a mismatch that no known effect removes: unexplained.";
@@ -120,7 +130,7 @@ std::string to_json(const Diagnosis& d) {
                              {"equivalent", d.equivalent},
                              {"separated_by", separated},
                              {"unexplained", d.unexplained},
-                             {"closest", {{"effects", effects_json(d.closest)}, {"share_of_excess_removed", number(d.removed_by_closest)}}},
+                             {"closest", {{"effects", effects_json(d.closest)}, {"share_of_excess_removed", number(d.removed_by_closest)}, {"not_named", d.closest.empty() ? "" : why_not_named(d.naming)}}},
                              {"remaining", mismatch_json(d.remaining)},
                              {"improvement", {{"bic_before", number(d.bic_before)}, {"bic_after", number(d.bic_after)}, {"runs", runs}}},
                              {"price_of_ignorance", shifts},
@@ -136,7 +146,7 @@ std::string report(const Diagnosis& d) {
   text += effects_text(d.missing);
   for (std::size_t i = 0; i < d.equivalent.size(); ++i) text += "    " + cannot_tell(d.equivalent[i], d.separated_by[i]) + "\n";
   if (d.unexplained) text += "[[Unexplained]]\n    " + d.remaining.summary + "\n";
-  if (!d.closest.empty()) text += fmt::format("    The set that comes closest removes {:.0f} % of the excess, {}:\n", 100 * d.removed_by_closest, d.removed_by_closest < enough_to_name ? "too little to be named" : "but does not predict runs that were not fitted") + effects_text(d.closest);
+  if (!d.closest.empty()) text += fmt::format("    The set that comes closest removes {:.0f} % of the excess, {}:\n", 100 * d.removed_by_closest, why_not_named(d.naming)) + effects_text(d.closest);
   for (const MissingForce& f : d.missing_force)
     text += fmt::format("    what is left of {} would be explained by a force of {:.3g} N r.m.s. at the calibration element, known to {:.2g} N (diagnosis file: missing_force)\n",
                         base_name(f.run), std::sqrt(f.value.squaredNorm() / static_cast<double>(f.value.size())), f.standard_deviation);

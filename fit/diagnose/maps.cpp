@@ -4,8 +4,8 @@
 #include <cmath>
 
 #include "core/spectrum.h"
-#include "fit/diagnose/mismatch.h"
 #include "fit/diagnose/run_states.h"
+#include "fit/standardised_residual.h"
 
 namespace unrig {
 namespace {

@@ -8,6 +8,7 @@
 #include "core/spectrum.h"
 #include "core/text_file.h"
 #include "fit/coloured_noise.h"
+#include "fit/standardised_residual.h"
 
 namespace unrig {
 namespace {
@@ -85,14 +86,6 @@ std::string describe(const RunResidual& run, const VectorXd& left, Mismatch& mis
 }
 
 }  // namespace
-
-VectorXd standardised_residual(const RunResidual& run, const RunResidual::Prediction& p, std::size_t c) {
-  const VectorXd& measured = run.run().channel(p.channels[c]).value;
-  const VectorXd weight = run.tempered() * run.channel_weight(c);
-  VectorXd left(measured.size());
-  for (Index k = 0; k < left.size(); ++k) left[k] = weight[k] > 0 && std::isfinite(measured[k]) ? weight[k] * (measured[k] - p.output(k, static_cast<Index>(c))) : 0;
-  return left;
-}
 
 Mismatch locate_mismatch(const JointProblem& joint) {
   Mismatch mismatch;

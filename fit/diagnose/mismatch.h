@@ -34,7 +34,4 @@ struct Mismatch {
 /// by more than 5 %: a motion that is known to its noise leaves up to that.
 Mismatch locate_mismatch(const JointProblem& joint);
 
-/// The residual of fitted channel `channel` of a run in units of its noise, untempered; 0 where left out.
-Eigen::VectorXd standardised_residual(const RunResidual& run, const RunResidual::Prediction& prediction, std::size_t channel);
-
 }  // namespace unrig

@@ -4,12 +4,14 @@
 
 #include <memory>
 #include <random>
+#include <stdexcept>
 #include <string>
 #include <vector>
 
 #include "core/in_parallel.h"
-#include "fit/diagnose/search.h"
+#include "fit/arrival.h"
 #include "fit/diagnose/trial_campaign.h"
+#include "fit/effect_search.h"
 #include "fit/fit.h"
 #include "tests/support/sample_data.h"
 
@@ -93,6 +95,25 @@ TEST(DecaysFirst, ASmallGapIsFollowedToTheNoise) {
   EXPECT_LT(left.chi2, 1.15) << "what counts as explained";
   // The fit rounds the gap's corners by a tenth of it.
   EXPECT_NEAR(unknowns_of(trial.arrival.joint, "freeplay").front()->value / hidden.parameters.front(), 1, 0.02);
+}
+
+TEST(DecaysFirst, WhatARunHasToItselfStaysWhenTheRigGoesBack) {
+  // In stall the normal-force slope is less than half of the rig file's, and no mistake.
+  const Hidden hidden = hide("freeplay", 702, 20);
+  JointProblem joint = hidden.baseline.arrival.joint;
+  const VectorXd rig = joint.model().start_values();
+  const auto value_of = [&](const char* name, int run) -> double& {
+    for (Unknown& u : joint.unknowns())
+      if (joint.parameter(u).name == name && u.run == run) return u.value;
+    throw std::out_of_range(name);
+  };
+  const double slope = 0.4 * rig[joint.model().index("normal_force_slope")], damping = rig[joint.model().index("torsion.damping_ratio")];
+  value_of("normal_force_slope", 4) = slope;
+  value_of("torsion.damping_ratio", -1) = 10 * damping;
+  EXPECT_TRUE(back_to_the_rig(joint, 2));
+  EXPECT_EQ(value_of("normal_force_slope", 4), slope);
+  EXPECT_EQ(value_of("torsion.damping_ratio", -1), damping);
+  EXPECT_FALSE(back_to_the_rig(joint, 2));
 }
 
 TEST(DecaysFirst, FrictionThatStopsTheRigIsFoundFromARigThatIsFarOff) {

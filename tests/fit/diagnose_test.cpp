@@ -99,6 +99,20 @@ TEST(Diagnose, WhatNoCandidateExplainsIsGivenAsAForce) {
   EXPECT_GT(step->value.norm() / std::sqrt(static_cast<double>(step->value.size())), 3 * step->standard_deviation);
 }
 
+/// The drag's name withheld: a decaying tone at the rig's own frequency, with an amplitude for every run, takes nearly all of what a drag does, and is no wave.
+TEST(Diagnose, ASignalThatLeavesAMismatchIsNotNamed) {
+  DiagnoseProblem problem = fitted_runs("drag");
+  problem.effects = {"tank-wave", "gauge-drift"};
+  problem.verdict_only = true;
+  const Diagnosis d = diagnose(problem);
+  EXPECT_TRUE(d.missing.empty());
+  EXPECT_TRUE(d.unexplained);
+  ASSERT_EQ(d.closest.size(), 1u);
+  EXPECT_EQ(d.closest.front().effect, "tank-wave");
+  EXPECT_GT(d.removed_by_closest, enough_to_name);
+  EXPECT_EQ(d.naming, Naming::only_signals);
+}
+
 TEST(DiagnosisFile, HasWhatTheFormatPromises) {
   const nlohmann::json json = nlohmann::json::parse(to_json(diagnose_campaign("null")));
   EXPECT_EQ(json["unrig"], "diagnosis");

@@ -6,8 +6,8 @@
 #include <numbers>
 #include <random>
 
-#include "fit/diagnose/search.h"
 #include "fit/diagnose/separating.h"
+#include "fit/effect_search.h"
 #include "fit/fit.h"
 #include "tests/support/sample_data.h"
 

@@ -33,6 +33,25 @@ TEST(TrialCampaign, HidesWhatItSaysAndRepeats) {
   EXPECT_EQ(draw({"tank-wave"}).runs[3].channel("gauge").value, wave.runs[3].channel("gauge").value);
 }
 
+TEST(TrialCampaign, GivesTheSizeOfEachOfTwo) {
+  const Rig rig = read_rig(test::null_campaign("rig.toml"));
+  const auto draw = [&](const std::vector<std::string>& hidden) {
+    std::mt19937_64 random(7);
+    return draw_campaign(rig, hidden, 0.03, random);
+  };
+  const TrialCampaign hum = draw({"mains-hum"}), both = draw({"cubic-stiffness", "mains-hum"}), modes = draw({"higher-mode", "gauge-drift"});
+  ASSERT_EQ(hum.sizes.size(), 1u);
+  EXPECT_NEAR(hum.sizes[0], hum.size, 1e-9 * hum.size);
+  ASSERT_EQ(both.sizes.size(), 2u);
+  EXPECT_GT(both.sizes[0], 0);
+  EXPECT_GT(both.sizes[1], 0.199) << "signals are drawn from 0.2 to 20 times the noise";
+  EXPECT_LT(both.sizes[1], 20.01);
+  EXPECT_LT(both.size, both.sizes[0] + both.sizes[1] + 1e-9) << "hum adds to the reading whatever the spring does; two traces add up to no more than both";
+  ASSERT_EQ(modes.sizes.size(), 2u);
+  EXPECT_GT(modes.sizes[0], 3) << "the modes that this rig has beside the first";
+  EXPECT_LT(modes.sizes[1], 20.01);
+}
+
 TEST(Trial, NothingHiddenAndAWave) {
   TrialProblem problem;
   problem.rig = read_rig(test::null_campaign("rig.toml"));

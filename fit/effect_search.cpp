@@ -1,4 +1,4 @@
-#include "fit/diagnose/search.h"
+#include "fit/effect_search.h"
 
 #include <Eigen/QR>
 #include <algorithm>
@@ -8,8 +8,8 @@
 #include "core/in_parallel.h"
 #include "core/spectrum.h"
 #include "fit/decays_first.h"
-#include "fit/diagnose/mismatch.h"
 #include "fit/fit.h"
+#include "fit/standardised_residual.h"
 
 namespace unrig {
 namespace {
@@ -152,6 +152,15 @@ bool nonlinear(const Trial& trial) {
 bool brings_a_law(const Trial& trial) {
   const AeroelasticModel& model = trial.arrival.joint.model();
   return is_a_law(trial.effects.back(), AeroelasticModel(model.rig(), model.basis(), model.circulation()), trial.arrival.joint);
+}
+
+bool only_signals(const Trial& trial) {
+  const JointProblem& joint = trial.arrival.joint;
+  const AeroelasticModel &model = joint.model(), rig(model.rig(), model.basis(), model.circulation());
+  return std::all_of(trial.effects.begin(), trial.effects.end(), [&](const std::string& id) {
+    const AeroelasticModel one = rig.with_effects({id});
+    return std::any_of(joint.runs().begin(), joint.runs().end(), [&](const RunResidual& run) { return !one.system(run.conditions(), one.start_values(), run.channels()).exogenous.empty(); });
+  });
 }
 
 double Trial::reduced_chi2() const {
