@@ -173,6 +173,16 @@ double Trial::reduced_chi2() const {
   return power / count;
 }
 
+double Trial::excess() const {
+  double power = 0, count = 0;
+  for (std::size_t r = 0; r < variance.size(); ++r) {
+    const auto n = static_cast<double>(arrival.joint.runs()[r].run().samples());
+    power += n * std::max(0.0, variance[r] - 1);
+    count += n;
+  }
+  return power / count;
+}
+
 double bic_difference(const Trial& a, const Trial& b) {
   const Trial& better = a.reduced_chi2() < b.reduced_chi2() ? a : b;
   double difference = 0, total = 0;

@@ -21,6 +21,8 @@ struct Trial {
   DecaysLeft decays = {INFINITY, true};  ///< what fit_decays left of them; infinite: not asked
 
   double reduced_chi2() const;    ///< over all runs, in units of the noise
+  /// Residual power above the noise, over the noise; a run that is left with less than its noise makes up for no other.
+  double excess() const;
 };
 
 constexpr double explained = 1.15;  ///< residual power over noise power of a model that leaves nothing to name

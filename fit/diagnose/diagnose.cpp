@@ -3,15 +3,12 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
-#include <iterator>
-
-#include <fmt/format.h>
-#include <fmt/ranges.h>
 
 #include "core/effects/effect.h"
 #include "core/in_parallel.h"
 #include "fit/decays_first.h"
 #include "fit/diagnose/heldout.h"
+#include "fit/diagnose/selection.h"
 #include "fit/effect_search.h"
 #include "fit/fit_description.h"
 
@@ -19,159 +16,13 @@ namespace unrig {
 namespace {
 
 using Eigen::Index;
-using Strings = std::vector<std::string>;
-using Progress = std::function<void(const std::string&)>;
 
-constexpr double half = 0.5;           // of the excess, where decays decide: the search leaves something of the other runs even when it has found what is missing
-constexpr double nearly_explained = 10, twice_the_noise = 2;
-constexpr double hardly_less = 0.9;    // of the excess: an effect that leaves so much of it is not what is missing
-constexpr double decisive = 10;        // BIC: very strong evidence (Kass and Raftery 1995)
-constexpr std::size_t most_refits = 5, most_effects = 3, most_in_full = 2;
-constexpr std::size_t few = 7;  // candidates that are all worth a fit
-
-/// Effects that can act in at least one of the runs of this rig, are not at work yet, and not `hopeless`.
-Strings candidates(const DiagnoseProblem& problem, const JointProblem& joint, const Strings& at_work, const Strings& hopeless) {
-  Strings ids;
-  for (const Effect& e : effects()) {
-    if (!problem.effects.empty() && std::find(problem.effects.begin(), problem.effects.end(), e.id) == problem.effects.end()) continue;
-    if (std::find(at_work.begin(), at_work.end(), e.id) != at_work.end()) continue;
-    if (std::find(hopeless.begin(), hopeless.end(), e.id) != hopeless.end()) continue;
-    if (!has(problem.rig, e.needs)) continue;
-    if (e.id == "higher-mode" && problem.rig.normal.modes == 0) continue;  // the model has them all
-    if (std::any_of(joint.runs().begin(), joint.runs().end(), [&](const RunResidual& run) { return e.acts(run.conditions()); })) ids.push_back(e.id);
-  }
-  return ids;
-}
-
-/// Some trials, the best first once they are fitted.
-using Trials = std::vector<Trial>;
-
-/// A few rounds for all, the rest for those that are ahead.
-void fit_linear(Trials& trials) {
-  in_parallel(trials.size(), [&](std::size_t i) { fit_fully(trials[i], 2); });
-  std::sort(trials.begin(), trials.end(), [](const Trial& a, const Trial& b) { return a.reduced_chi2() < b.reduced_chi2(); });
-  in_parallel(std::min(trials.size(), most_in_full), [&](std::size_t i) { fit_fully(trials[i], 6); });
-}
-
-/// By the free decays first, the most promising effect first; none after one that leaves nothing of a mismatch too large for two laws to explain alike.
-void fit_nonlinear(const Progress& tell, Trials& trials, const Trial& base) {
-  double least = base.reduced_chi2();
-  for (std::size_t i = 0; i < trials.size(); ++i) {
-    Trial& trial = trials[i];
-    tell(fmt::format("trying {}", fmt::join(trial.effects, " with ")));
-    follow_nonlinear(trial, base, least);
-    least = std::min(least, trial.reduced_chi2());
-    if (!leaves_nothing(trial) || base.reduced_chi2() < nearly_explained) continue;
-    trials.erase(trials.begin() + static_cast<std::ptrdiff_t>(i) + 1, trials.end());
-  }
-  std::sort(trials.begin(), trials.end(), [](const Trial& a, const Trial& b) { return a.reduced_chi2() < b.reduced_chi2(); });
-}
-
-/// What has come to rest at a limit of what its parameters may be, other than zero, and leaves something stands in for something else.
-bool plausible(const Trial& trial) {
-  const JointProblem& joint = trial.arrival.joint;
-  return leaves_nothing(trial) || std::none_of(joint.unknowns().begin(), joint.unknowns().end(), [&](const Unknown& u) {
-    const Parameter& p = joint.parameter(u);
-    const auto at = [&](double bound) { return bound != 0 && std::abs(u.value - bound) < 1e-6 * std::abs(bound); };
-    return !u.held && p.name.starts_with(trial.effects.back() + ".") && (at(p.lower) || at(p.upper));
-  });
-}
-
-bool any_leaves_nothing(const Trials& trials) { return std::any_of(trials.begin(), trials.end(), leaves_nothing); }
-
-/// All over again for those ahead, and for effects whose own fit has nothing to search in.
-void fit_anew(const FitProblem& problem, Trials& trials) {
-  in_parallel(trials.size(), [&](std::size_t i) {
-    if (decays_decide(trials[i])) return;
-    if (i < most_in_full || effect(trials[i].effects.back()).parameters.empty()) fit_from_first_guesses(problem, trials[i]);
-  });
-}
-
-/// And for the others: among fits that all are far from the data, which is ahead says little.
-void fit_others_anew(const FitProblem& problem, Trials& trials) {
-  if (trials.size() <= most_in_full) return;
-  in_parallel(trials.size() - most_in_full, [&](std::size_t i) {
-    Trial& trial = trials[most_in_full + i];
-    if (!effect(trial.effects.back()).parameters.empty()) fit_from_first_guesses(problem, trial);
-  });
-}
-
-/// The best of all sets that have one effect more than `base`: all of them by one linear step, the promising ones in full.
-Trials try_one_more(const DiagnoseProblem& problem, const FitProblem& fit_problem, const Trial& base, const Strings& hopeless, const Progress& tell) {
-  const Strings ids = candidates(problem, base.arrival.joint, base.effects, hopeless);
-  std::vector<std::unique_ptr<Trial>> prepared(ids.size());
-  in_parallel(ids.size(), [&](std::size_t i) {
-    Strings set = base.effects;
-    set.push_back(ids[i]);
-    prepared[i] = std::make_unique<Trial>(prepare(fit_problem, base, set));
-  });
-  std::sort(prepared.begin(), prepared.end(), [](const auto& a, const auto& b) { return a->score > b->score; });
-  const double best_score = prepared.empty() ? 0 : prepared.front()->score;
-  Trials linear, others, unpromising;
-  for (const auto& trial : prepared) {
-    const bool promises_nothing = effect(trial->effects.back()).parameters.empty();  // it may hold all the same
-    const bool follows_law = nonlinear(*trial), far = base.reduced_chi2() > twice_the_noise;
-    const bool promises = linear.size() + others.size() < most_refits && (trial->score > 0.25 * best_score || (follows_law && far));
-    const bool step_says_nothing = far && brings_a_law(*trial);  // a law far from the truth
-    if (prepared.size() <= few || promises_nothing || promises || step_says_nothing) (follows_law ? others : linear).push_back(std::move(*trial));
-    else if (unpromising.size() < most_in_full && !follows_law) unpromising.push_back(std::move(*trial));
-  }
-  // Linear effects first, which are an order faster; nonlinear ones where none of those leaves nothing or they promise as much.
-  constexpr double clearly = 0.8;
-  const bool favours_linear = others.empty() || (!linear.empty() && clearly * linear.front().score >= others.front().score);
-  fit_linear(linear);
-  bool done = any_leaves_nothing(linear);
-  if (favours_linear && !done) {
-    fit_anew(fit_problem, linear);
-    done = any_leaves_nothing(linear);
-  }
-  if (!done || !favours_linear) {  // a decaying tone may leave nothing of what a weak drag does, and explain it worse
-    fit_nonlinear(tell, others, base);
-    done = done || any_leaves_nothing(others);
-    if (!done && !favours_linear) fit_anew(fit_problem, linear);
-    const bool decays_have_told = has_decays(base.arrival.joint);  // from first guesses nonlinear laws are not found where their decays do not lead
-    if (!done && !decays_have_told && !any_leaves_nothing(linear)) fit_anew(fit_problem, others);
-    if (!done && !any_leaves_nothing(linear) && !any_leaves_nothing(others) && base.effects.empty() && base.reduced_chi2() > nearly_explained) fit_others_anew(fit_problem, linear);
-    std::move(others.begin(), others.end(), std::back_inserter(linear));
-    if (!any_leaves_nothing(linear)) {  // far from the truth one linear step promises little of what there is
-      fit_anew(fit_problem, unpromising);
-      std::move(unpromising.begin(), unpromising.end(), std::back_inserter(linear));
-    }
-  }
-  std::sort(linear.begin(), linear.end(), [](const Trial& a, const Trial& b) { return bic_difference(a, b) < 0; });
-  std::stable_partition(linear.begin(), linear.end(), plausible);
-  return linear;
-}
-
-/// Takes away again what the others made superfluous; the last one too: by way of it the others may have come to a minimum that they had missed.
-Trial without_superfluous(const FitProblem& fit_problem, Trial trial) {
-  for (std::size_t k = 0; trial.effects.size() > 1 && k < trial.effects.size();) {
-    Strings fewer = trial.effects;
-    fewer.erase(fewer.begin() + static_cast<std::ptrdiff_t>(k));
-    Trial smaller = prepare(fit_problem, trial, fewer);
-    fit_fully(smaller, 6);
-    if (bic_difference(smaller, trial) < decisive)
-      trial = std::move(smaller);
-    else
-      ++k;
-  }
-  return trial;
-}
-
-/// Residual power above the noise, over the noise; a run that is left with less than its noise makes up for no other.
-double excess(const Trial& trial) {
-  double power = 0, count = 0;
-  for (std::size_t r = 0; r < trial.variance.size(); ++r) {
-    const auto n = static_cast<double>(trial.arrival.joint.runs()[r].run().samples());
-    power += n * std::max(0.0, trial.variance[r] - 1);
-    count += n;
-  }
-  return power / count;
-}
+constexpr double half = 0.5;  // of the excess, where decays decide: the search leaves something of the other runs even when it has found what is missing
+constexpr double twice_the_noise = 2;
 
 /// Whether decays that decide are followed, to the noise or in nearly all that they had above it.
 bool follows_decays(const Trial& trial, const Trial& baseline) {
-  if (!decays_decide(trial) || excess(trial) > half * excess(baseline)) return false;
+  if (!decays_decide(trial) || trial.excess() > half * baseline.excess()) return false;
   const bool nearly = trial.decays.exactly && left_of_decays(trial) - 1 < (1 - enough_to_name) * (left_of_decays(baseline) - 1);
   return trial.decays.chi2 < explained || nearly;
 }
@@ -180,16 +31,8 @@ bool follows_decays(const Trial& trial, const Trial& baseline) {
 Naming naming_of(const Trial& best, const Trial& baseline, bool clean, bool predicts) {
   if (!predicts) return Naming::does_not_predict;
   if (clean || follows_decays(best, baseline)) return Naming::named;
-  if (excess(best) > (1 - enough_to_name) * excess(baseline)) return Naming::removes_too_little;
+  if (best.excess() > (1 - enough_to_name) * baseline.excess()) return Naming::removes_too_little;
   return only_signals(best) ? Naming::only_signals : Naming::named;
-}
-
-/// exp(-BIC/2) over the sum of it over all.
-void give_probabilities(std::vector<Candidate>& ranking) {
-  double least = 0, sum = 0;
-  for (const Candidate& c : ranking) least = std::min(least, c.delta_bic);
-  for (Candidate& c : ranking) sum += c.probability = std::exp(-0.5 * (c.delta_bic - least));
-  for (Candidate& c : ranking) c.probability /= sum;
 }
 
 /// What runs that were not fitted are left with, before and after.
@@ -254,7 +97,7 @@ std::vector<MissingEffect> effects_of(const Trial& best, const Diagnosis& d) {
 }
 
 /// The sets of `tried` that are as good as the best.
-void name_equivalent(const Trial& baseline, const Trial& best, const Trials& tried, bool verdict_only, Diagnosis& d) {
+void name_equivalent(const Trial& baseline, const Trial& best, const std::vector<Trial>& tried, bool verdict_only, Diagnosis& d) {
   const double best_bic = bic_difference(best, baseline);
   for (const Trial& t : tried) {
     const bool other = t.effects != best.effects && t.effects.size() <= best.effects.size();
@@ -268,7 +111,7 @@ void name_equivalent(const Trial& baseline, const Trial& best, const Trials& tri
 
 Diagnosis diagnose(const DiagnoseProblem& problem) {
   const auto begin = std::chrono::steady_clock::now();
-  const Progress tell = [&](const std::string& what) {
+  const auto tell = [&](const std::string& what) {
     if (problem.progress) problem.progress(what);
   };
   FitProblem fit_problem;
@@ -281,25 +124,9 @@ Diagnosis diagnose(const DiagnoseProblem& problem) {
   Diagnosis d;
   d.mismatch = locate_mismatch(baseline.arrival.joint);
   if (!problem.verdict_only) d.maps = residual_maps(baseline.arrival.joint, d.mismatch.runs);
-  d.ranking.push_back({{}, baseline.reduced_chi2(), 0, 0, 0});
-
-  Trial best = baseline;
-  Trials all_tried;
-  Strings hopeless;  // laws with which alone the fit is worse than without
-  while (best.effects.size() < most_effects && !decays_decide(best) && (best.effects.empty() ? d.mismatch.found : best.reduced_chi2() > explained && locate_mismatch(best.arrival.joint).found)) {
-    tell(best.effects.empty() ? "trying what may be missing" : "trying what may be missing beside " + best.effects.back());
-    Trials tried = try_one_more(problem, fit_problem, best, hopeless, tell);
-    for (const Trial& t : tried) d.ranking.push_back({t.effects, t.reduced_chi2(), bic_difference(t, baseline), 0, best.effects.empty() ? t.score : 0});
-    for (const Trial& t : tried)
-      if (best.effects.empty() && brings_a_law(t) && bic_difference(t, baseline) > decisive) hopeless.push_back(t.effects.back());
-    if (tried.empty() || !(best.effects.empty() || plausible(tried.front())) || bic_difference(tried.front(), best) > -decisive) break;
-    if (!leaves_nothing(tried.front()) && excess(tried.front()) > hardly_less * excess(best)) break;
-    best = without_superfluous(fit_problem, tried.front());
-    std::move(tried.begin(), tried.end(), std::back_inserter(all_tried));
-  }
-  give_probabilities(d.ranking);
-  std::sort(d.ranking.begin(), d.ranking.end(), [](const Candidate& a, const Candidate& b) { return a.delta_bic < b.delta_bic; });
-
+  Selection selection(problem, fit_problem, baseline);
+  const Trial best = selection.best_set();
+  d.ranking = selection.ranking();
   d.remaining = locate_mismatch(best.arrival.joint);
   const bool clean = !d.remaining.found;
   const std::vector<ImprovedRun> unseen = problem.verdict_only ? std::vector<ImprovedRun>{} : predict_unseen(problem, fit_problem, baseline.arrival, best);
@@ -314,8 +141,8 @@ Diagnosis diagnose(const DiagnoseProblem& problem) {
   }
   if (!best.effects.empty()) {
     d.naming = naming_of(best, baseline, clean, predicts);
-    if (d.naming == Naming::named) name_equivalent(baseline, best, all_tried, problem.verdict_only, d);
-    else d.removed_by_closest = 1 - excess(best) / excess(baseline);
+    if (d.naming == Naming::named) name_equivalent(baseline, best, selection.tried(), problem.verdict_only, d);
+    else d.removed_by_closest = 1 - best.excess() / baseline.excess();
     (d.naming == Naming::named ? d.missing : d.closest) = effects_of(best, d);
   }
   d.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();

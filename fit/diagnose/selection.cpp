@@ -1,0 +1,207 @@
+#include "fit/diagnose/selection.h"
+
+#include <algorithm>
+#include <cmath>
+#include <iterator>
+#include <memory>
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include "core/effects/effect.h"
+#include "core/in_parallel.h"
+#include "fit/decays_first.h"
+#include "fit/diagnose/mismatch.h"
+
+namespace unrig {
+namespace {
+
+using Strings = std::vector<std::string>;
+using Trials = std::vector<Trial>;  // the best first once they are fitted
+using Progress = std::function<void(const std::string&)>;
+
+constexpr double nearly_explained = 10, twice_the_noise = 2;
+constexpr double hardly_less = 0.9;  // of the excess: an effect that leaves so much of it is not what is missing
+constexpr std::size_t most_refits = 5, most_effects = 3, most_in_full = 2;
+constexpr std::size_t few = 7;  // candidates that are all worth a fit
+
+/// A few rounds for all, the rest for those that are ahead.
+void fit_linear(Trials& trials) {
+  in_parallel(trials.size(), [&](std::size_t i) { fit_fully(trials[i], 2); });
+  std::sort(trials.begin(), trials.end(), [](const Trial& a, const Trial& b) { return a.reduced_chi2() < b.reduced_chi2(); });
+  in_parallel(std::min(trials.size(), most_in_full), [&](std::size_t i) { fit_fully(trials[i], 6); });
+}
+
+/// By the free decays first, the most promising effect first; none after one that leaves nothing of a mismatch too large for two laws to explain alike.
+void fit_nonlinear(const Progress& tell, Trials& trials, const Trial& base) {
+  double least = base.reduced_chi2();
+  for (std::size_t i = 0; i < trials.size(); ++i) {
+    Trial& trial = trials[i];
+    if (tell) tell(fmt::format("trying {}", fmt::join(trial.effects, " with ")));
+    follow_nonlinear(trial, base, least);
+    least = std::min(least, trial.reduced_chi2());
+    if (!leaves_nothing(trial) || base.reduced_chi2() < nearly_explained) continue;
+    trials.erase(trials.begin() + static_cast<std::ptrdiff_t>(i) + 1, trials.end());
+  }
+  std::sort(trials.begin(), trials.end(), [](const Trial& a, const Trial& b) { return a.reduced_chi2() < b.reduced_chi2(); });
+}
+
+/// What has come to rest at a limit of what its parameters may be, other than zero, and leaves something stands in for something else.
+bool plausible(const Trial& trial) {
+  const JointProblem& joint = trial.arrival.joint;
+  return leaves_nothing(trial) || std::none_of(joint.unknowns().begin(), joint.unknowns().end(), [&](const Unknown& u) {
+    const Parameter& p = joint.parameter(u);
+    const auto at = [&](double bound) { return bound != 0 && std::abs(u.value - bound) < 1e-6 * std::abs(bound); };
+    return !u.held && p.name.starts_with(trial.effects.back() + ".") && (at(p.lower) || at(p.upper));
+  });
+}
+
+bool any_leaves_nothing(const Trials& trials) { return std::any_of(trials.begin(), trials.end(), leaves_nothing); }
+
+/// All over again for those ahead, and for effects whose own fit has nothing to search in.
+void fit_anew(const FitProblem& problem, Trials& trials) {
+  in_parallel(trials.size(), [&](std::size_t i) {
+    if (decays_decide(trials[i])) return;
+    if (i < most_in_full || effect(trials[i].effects.back()).parameters.empty()) fit_from_first_guesses(problem, trials[i]);
+  });
+}
+
+/// And for the others: among fits that all are far from the data, which is ahead says little.
+void fit_others_anew(const FitProblem& problem, Trials& trials) {
+  if (trials.size() <= most_in_full) return;
+  in_parallel(trials.size() - most_in_full, [&](std::size_t i) {
+    Trial& trial = trials[most_in_full + i];
+    if (!effect(trial.effects.back()).parameters.empty()) fit_from_first_guesses(problem, trial);
+  });
+}
+
+}  // namespace
+
+Selection::Selection(const DiagnoseProblem& problem, const FitProblem& fit_problem, const Trial& baseline) : problem_(problem), fit_problem_(fit_problem), baseline_(baseline) {
+  ranking_.push_back({{}, baseline.reduced_chi2(), 0, 0, 0});
+}
+
+/// Effects that can act in at least one of the runs of this rig, are not at work yet, and not `hopeless`.
+Strings Selection::candidates(const Strings& at_work, const Strings& hopeless) const {
+  const JointProblem& joint = baseline_.arrival.joint;
+  Strings ids;
+  for (const Effect& e : effects()) {
+    if (!problem_.effects.empty() && std::find(problem_.effects.begin(), problem_.effects.end(), e.id) == problem_.effects.end()) continue;
+    if (std::find(at_work.begin(), at_work.end(), e.id) != at_work.end()) continue;
+    if (std::find(hopeless.begin(), hopeless.end(), e.id) != hopeless.end()) continue;
+    if (!has(problem_.rig, e.needs)) continue;
+    if (e.id == "higher-mode" && problem_.rig.normal.modes == 0) continue;  // the model has them all
+    if (std::any_of(joint.runs().begin(), joint.runs().end(), [&](const RunResidual& run) { return e.acts(run.conditions()); })) ids.push_back(e.id);
+  }
+  return ids;
+}
+
+/// The best of all sets that have one effect more than `base`: all of them by one linear step, the promising ones in full.
+Trials Selection::try_one_more(const Trial& base, const Strings& hopeless) {
+  const Strings ids = candidates(base.effects, hopeless);
+  std::vector<std::unique_ptr<Trial>> prepared(ids.size());
+  in_parallel(ids.size(), [&](std::size_t i) {
+    Strings set = base.effects;
+    set.push_back(ids[i]);
+    prepared[i] = std::make_unique<Trial>(prepare(fit_problem_, base, set));
+  });
+  std::sort(prepared.begin(), prepared.end(), [](const auto& a, const auto& b) { return a->score > b->score; });
+  const double best_score = prepared.empty() ? 0 : prepared.front()->score;
+  Trials linear, others, unpromising;
+  for (const auto& trial : prepared) {
+    const bool promises_nothing = effect(trial->effects.back()).parameters.empty();  // it may hold all the same
+    const bool follows_law = nonlinear(*trial), far = base.reduced_chi2() > twice_the_noise;
+    const bool promises = linear.size() + others.size() < most_refits && (trial->score > 0.25 * best_score || (follows_law && far));
+    const bool step_says_nothing = far && brings_a_law(*trial);  // a law far from the truth
+    if (prepared.size() <= few || promises_nothing || promises || step_says_nothing) (follows_law ? others : linear).push_back(std::move(*trial));
+    else if (unpromising.size() < most_in_full && !follows_law) unpromising.push_back(std::move(*trial));
+  }
+  // Linear effects first, which are an order faster; nonlinear ones where none of those leaves nothing or they promise as much.
+  constexpr double clearly = 0.8;
+  const bool favours_linear = others.empty() || (!linear.empty() && clearly * linear.front().score >= others.front().score);
+  fit_linear(linear);
+  bool done = any_leaves_nothing(linear);
+  if (favours_linear && !done) {
+    fit_anew(fit_problem_, linear);
+    done = any_leaves_nothing(linear);
+  }
+  if (!done || !favours_linear) {  // a decaying tone may leave nothing of what a weak drag does, and explain it worse
+    fit_nonlinear(problem_.progress, others, base);
+    done = done || any_leaves_nothing(others);
+    if (!done && !favours_linear) fit_anew(fit_problem_, linear);
+    const bool decays_have_told = has_decays(base.arrival.joint);  // from first guesses nonlinear laws are not found where their decays do not lead
+    if (!done && !decays_have_told && !any_leaves_nothing(linear)) fit_anew(fit_problem_, others);
+    if (!done && !any_leaves_nothing(linear) && !any_leaves_nothing(others) && base.effects.empty() && base.reduced_chi2() > nearly_explained) fit_others_anew(fit_problem_, linear);
+    std::move(others.begin(), others.end(), std::back_inserter(linear));
+    if (!any_leaves_nothing(linear)) {  // far from the truth one linear step promises little of what there is
+      fit_anew(fit_problem_, unpromising);
+      std::move(unpromising.begin(), unpromising.end(), std::back_inserter(linear));
+    }
+  }
+  std::sort(linear.begin(), linear.end(), [](const Trial& a, const Trial& b) { return bic_difference(a, b) < 0; });
+  std::stable_partition(linear.begin(), linear.end(), plausible);
+  for (const Trial& t : linear) ranking_.push_back({t.effects, t.reduced_chi2(), bic_difference(t, baseline_), 0, base.effects.empty() ? t.score : 0});
+  return linear;
+}
+
+/// Takes away again what the others made superfluous; the last one too: by way of it the others may have come to a minimum that they had missed.
+Trial Selection::without_superfluous(Trial trial) const {
+  for (std::size_t k = 0; trial.effects.size() > 1 && k < trial.effects.size();) {
+    Strings fewer = trial.effects;
+    fewer.erase(fewer.begin() + static_cast<std::ptrdiff_t>(k));
+    Trial smaller = prepare(fit_problem_, trial, fewer);
+    fit_fully(smaller, 6);
+    if (bic_difference(smaller, trial) < decisive)
+      trial = std::move(smaller);
+    else
+      ++k;
+  }
+  return trial;
+}
+
+/// Of several effects that leave a mismatch the earlier ones are exchanged, each in turn, for what explains more beside the others: the first to be found may have stood
+/// in for what was still missing.
+Trial Selection::exchanged(Trial trial, const Strings& hopeless) {
+  for (std::size_t k = 0; k + 1 < trial.effects.size() && locate_mismatch(trial.arrival.joint).found; ++k) {
+    Strings fewer = trial.effects, not_again = hopeless;
+    not_again.push_back(fewer[k]);
+    fewer.erase(fewer.begin() + static_cast<std::ptrdiff_t>(k));
+    tell("trying what may be missing in place of " + not_again.back());
+    Trial others = prepare(fit_problem_, trial, fewer);
+    fit_fully(others, 6);
+    Trials tried = try_one_more(others, not_again);
+    if (tried.empty() || bic_difference(tried.front(), trial) > -decisive) continue;
+    trial = without_superfluous(tried.front());
+    std::move(tried.begin(), tried.end(), std::back_inserter(tried_));
+  }
+  return trial;
+}
+
+Trial Selection::best_set() {
+  Trial best = baseline_;
+  Strings hopeless;  // laws with which alone the fit is worse than without
+  while (best.effects.size() < most_effects && !decays_decide(best) && (best.effects.empty() || best.reduced_chi2() > explained) && locate_mismatch(best.arrival.joint).found) {
+    tell(best.effects.empty() ? "trying what may be missing" : "trying what may be missing beside " + best.effects.back());
+    Trials tried = try_one_more(best, hopeless);
+    for (const Trial& t : tried)
+      if (best.effects.empty() && brings_a_law(t) && bic_difference(t, baseline_) > decisive) hopeless.push_back(t.effects.back());
+    if (tried.empty() || !(best.effects.empty() || plausible(tried.front())) || bic_difference(tried.front(), best) > -decisive) break;
+    if (!leaves_nothing(tried.front()) && tried.front().excess() > hardly_less * best.excess()) break;
+    best = exchanged(without_superfluous(tried.front()), hopeless);
+    std::move(tried.begin(), tried.end(), std::back_inserter(tried_));
+  }
+  return best;
+}
+
+/// Probabilities: exp(-BIC/2) over the sum of it over all.
+std::vector<Candidate> Selection::ranking() const {
+  std::vector<Candidate> ranking = ranking_;
+  double least = 0, sum = 0;
+  for (const Candidate& c : ranking) least = std::min(least, c.delta_bic);
+  for (Candidate& c : ranking) sum += c.probability = std::exp(-0.5 * (c.delta_bic - least));
+  for (Candidate& c : ranking) c.probability /= sum;
+  std::sort(ranking.begin(), ranking.end(), [](const Candidate& a, const Candidate& b) { return a.delta_bic < b.delta_bic; });
+  return ranking;
+}
+
+}  // namespace unrig

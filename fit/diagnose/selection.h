@@ -1,0 +1,43 @@
+#pragma once
+#include <string>
+#include <vector>
+
+#include "fit/diagnose/diagnose.h"
+#include "fit/effect_search.h"
+
+namespace unrig {
+
+constexpr double decisive = 10;  ///< BIC: very strong evidence (Kass and Raftery, J. American Statistical Association 90 (1995) 773)
+
+/// Which set of effects explains what a baseline leaves. The set grows by one effect at a time, the best of all that are worth a fit; what others made superfluous
+/// is taken away again, and while a mismatch remains the earlier members are exchanged for what explains more beside the others. No set has more than three.
+class Selection {
+ public:
+  /// Looks at all three as long as it lives.
+  Selection(const DiagnoseProblem& problem, const FitProblem& fit_problem, const Trial& baseline);
+
+  /// `baseline` itself where no mismatch is found or no effect is worth it.
+  Trial best_set();
+
+  /// Sets that were fitted in rounds from which the search went on.
+  const std::vector<Trial>& tried() const { return tried_; }
+  /// All sets that were fitted and the baseline, the best first.
+  std::vector<Candidate> ranking() const;
+
+ private:
+  std::vector<std::string> candidates(const std::vector<std::string>& at_work, const std::vector<std::string>& hopeless) const;
+  std::vector<Trial> try_one_more(const Trial& base, const std::vector<std::string>& hopeless);
+  Trial without_superfluous(Trial trial) const;
+  Trial exchanged(Trial trial, const std::vector<std::string>& hopeless);
+  void tell(const std::string& what) const {
+    if (problem_.progress) problem_.progress(what);
+  }
+
+  const DiagnoseProblem& problem_;
+  const FitProblem& fit_problem_;
+  const Trial& baseline_;
+  std::vector<Trial> tried_;
+  std::vector<Candidate> ranking_;
+};
+
+}  // namespace unrig
