@@ -180,7 +180,7 @@ Trial Selection::exchanged(Trial trial, const Strings& hopeless) {
 Trial Selection::best_set() {
   Trial best = baseline_;
   Strings hopeless;  // laws with which alone the fit is worse than without
-  while (best.effects.size() < most_effects && !decays_decide(best) && (best.effects.empty() || best.reduced_chi2() > explained) && locate_mismatch(best.arrival.joint).found) {
+  while (best.effects.size() < most_effects && !decays_decide(best) && locate_mismatch(best.arrival.joint).found) {
     tell(best.effects.empty() ? "trying what may be missing" : "trying what may be missing beside " + best.effects.back());
     Trials tried = try_one_more(best, hopeless);
     for (const Trial& t : tried)
