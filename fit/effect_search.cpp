@@ -154,13 +154,10 @@ bool brings_a_law(const Trial& trial) {
   return is_a_law(trial.effects.back(), AeroelasticModel(model.rig(), model.basis(), model.circulation()), trial.arrival.joint);
 }
 
-bool only_signals(const Trial& trial) {
-  const JointProblem& joint = trial.arrival.joint;
-  const AeroelasticModel &model = joint.model(), rig(model.rig(), model.basis(), model.circulation());
-  return std::all_of(trial.effects.begin(), trial.effects.end(), [&](const std::string& id) {
-    const AeroelasticModel one = rig.with_effects({id});
-    return std::any_of(joint.runs().begin(), joint.runs().end(), [&](const RunResidual& run) { return !one.system(run.conditions(), one.start_values(), run.channels()).exogenous.empty(); });
-  });
+bool is_a_signal(const std::string& id, const JointProblem& joint) {
+  const AeroelasticModel& all = joint.model();
+  const AeroelasticModel model = AeroelasticModel(all.rig(), all.basis(), all.circulation()).with_effects({id});
+  return std::any_of(joint.runs().begin(), joint.runs().end(), [&](const RunResidual& run) { return !model.system(run.conditions(), model.start_values(), run.channels()).exogenous.empty(); });
 }
 
 double Trial::reduced_chi2() const {

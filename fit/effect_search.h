@@ -33,8 +33,8 @@ bool nonlinear(const Trial& trial);
 /// Whether the last effect is such a law.
 bool brings_a_law(const Trial& trial);
 
-/// Whether every effect is a signal with amplitudes of its own in each run, which take a share of anything that lies at its frequencies.
-bool only_signals(const Trial& trial);
+/// Whether an effect is a signal with amplitudes of its own in each run, which take a share of anything that lies at its frequencies.
+bool is_a_signal(const std::string& id, const JointProblem& joint);
 
 /// -2 ln likelihood of the gauge with each run's own variance, and of the angle where both explain the run, plus ln(samples) per variable, of `a` less that of `b`
 /// (G. Schwarz, Annals of Statistics 6 (1978) 461). Samples of the gauge count by the colour of the better of the two.

@@ -32,7 +32,8 @@ Naming naming_of(const Trial& best, const Trial& baseline, bool clean, bool pred
   if (!predicts) return Naming::does_not_predict;
   if (clean || follows_decays(best, baseline)) return Naming::named;
   if (best.excess() > (1 - enough_to_name) * baseline.excess()) return Naming::removes_too_little;
-  return only_signals(best) ? Naming::only_signals : Naming::named;
+  const bool only_signals = std::all_of(best.effects.begin(), best.effects.end(), [&](const std::string& id) { return is_a_signal(id, best.arrival.joint); });
+  return only_signals ? Naming::only_signals : Naming::named;
 }
 
 /// What runs that were not fitted are left with, before and after.

@@ -159,10 +159,10 @@ Trial Selection::without_superfluous(Trial trial) const {
   return trial;
 }
 
-/// Of several effects that leave a mismatch the earlier ones are exchanged, each in turn, for what explains more beside the others: the first to be found may have stood
-/// in for what was still missing.
+/// Of several effects that leave a mismatch a signal is exchanged for what explains more beside the others: found first, it may have stood in for what was still missing.
 Trial Selection::exchanged(Trial trial, const Strings& hopeless) {
-  for (std::size_t k = 0; k + 1 < trial.effects.size() && locate_mismatch(trial.arrival.joint).found; ++k) {
+  for (std::size_t k = 0; k + 1 < trial.effects.size(); ++k) {
+    if (!is_a_signal(trial.effects[k], trial.arrival.joint) || !locate_mismatch(trial.arrival.joint).found) continue;
     Strings fewer = trial.effects, not_again = hopeless;
     not_again.push_back(fewer[k]);
     fewer.erase(fewer.begin() + static_cast<std::ptrdiff_t>(k));

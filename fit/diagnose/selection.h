@@ -10,7 +10,7 @@ namespace unrig {
 constexpr double decisive = 10;  ///< BIC: very strong evidence (Kass and Raftery, J. American Statistical Association 90 (1995) 773)
 
 /// Which set of effects explains what a baseline leaves. The set grows by one effect at a time, the best of all that are worth a fit; what others made superfluous
-/// is taken away again, and while a mismatch remains the earlier members are exchanged for what explains more beside the others. No set has more than three.
+/// is taken away again, and while a mismatch remains signals among the earlier members are exchanged for what explains more beside the others. No set has more than three.
 class Selection {
  public:
   /// Looks at all three as long as it lives.
