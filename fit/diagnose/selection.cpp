@@ -18,7 +18,7 @@ namespace {
 
 using Strings = std::vector<std::string>;
 using Trials = std::vector<Trial>;  // the best first once they are fitted
-using Progress = std::function<void(const std::string&)>;
+using Tell = std::function<void(const std::string&)>;
 
 constexpr double nearly_explained = 10, twice_the_noise = 2;
 constexpr double hardly_less = 0.9;  // of the excess: an effect that leaves so much of it is not what is missing
@@ -33,7 +33,7 @@ void fit_linear(Trials& trials) {
 }
 
 /// By the free decays first, the most promising effect first; none after one that leaves nothing of a mismatch too large for two laws to explain alike.
-void fit_nonlinear(const Progress& tell, Trials& trials, const Trial& base) {
+void fit_nonlinear(const Tell& tell, Trials& trials, const Trial& base) {
   double least = base.reduced_chi2();
   for (std::size_t i = 0; i < trials.size(); ++i) {
     Trial& trial = trials[i];
