@@ -59,14 +59,6 @@ ParameterUncertainty settle(Arrival& arrival, const FitProblem& problem, bool st
   return uncertainty;
 }
 
-/// A run that its own unknowns take up altogether would only seem to be explained.
-void check_lengths(const Arrival& arrival) {
-  for (const RunResidual& run : arrival.joint.runs())
-    if (run.degrees_of_freedom() <= 0)
-      throw InputError({run.run().file, 0}, fmt::format("{} samples for {} unknowns of the run itself (how it starts, its zeros, its motion)", run.observations(), run.linear_unknowns()),
-                       "wanted more samples than that", "Record for several periods of the rig's lowest mode, or leave the run out.");
-}
-
 /// A name that no parameter has must not pass in silence.
 void check_names(const AeroelasticModel& model, const FitProblem& problem) {
   std::string names;
@@ -133,7 +125,7 @@ FitResult fit(const FitProblem& problem) {
   const auto model = std::make_shared<const AeroelasticModel>(model_of(problem.rig, problem.runs, problem.circulation, problem.effects));
   check_names(*model, problem);
   Arrival arrival = problem.effects.empty() ? arrive(problem, model) : arrive_at_effects(problem);
-  check_lengths(arrival);
+  check_lengths(arrival.joint);
   FitResult result = describe_fit(arrival, problem, Settle::steps);
   result.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
   return result;

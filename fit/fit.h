@@ -56,7 +56,7 @@ struct FittedRun {
   Eigen::Index degrees_of_freedom = 0;
   std::vector<FittedChannel> channels;  ///< the fitted outputs, then `alpha` where the motion was estimated
   double whiteness = 1;  ///< probability that white noise looks at least as coloured as the residual
-  double followed = 1;   ///< share of the readings' variance that the model follows, of the channel that it follows least
+  double followed = 1;   ///< share of the readings' variance that the model follows (fit/share_followed.h), of the channel that it follows least
   double reduced_chi2() const { return chi2 / static_cast<double>(degrees_of_freedom); }
   /// Whether chi-square is what noise would leave: it scatters by sqrt(2/n), the noise level that it counts in, and its square, by a few per cent.
   bool explained() const;
@@ -103,8 +103,8 @@ struct FitResult {
 /// Both are in the result. What the runs do not determine is held; the standard errors of the others allow for as much as it may be off
 /// (fit/undetermined.h), and where that leaves nothing known of one it is not identified either: `determined` then has the combination that is.
 ///
-/// There is no answer (`no_answer`) where the search has not converged, a run is left with more than half of the variance of a channel and not with its noise (a wrong
-/// minimum, or not this rig), fewer than 20 degrees of freedom remain (the scatter itself is then known to worse than 1/sqrt(40)), or nothing is determined.
+/// There is no answer (`no_answer`) where the search has not converged, a run is left with more than half of the variance of a channel (fit/share_followed.h) and not with its
+/// noise (a wrong minimum, or not this rig), fewer than 20 degrees of freedom remain (the scatter itself is then known to worse than 1/sqrt(40)), or nothing is determined.
 /// No parameter is `identified` then.
 /// Throws InputError where a run does not belong to the rig or is too short to say more than where it starts, or a name belongs to no parameter.
 FitResult fit(const FitProblem& problem);

@@ -6,8 +6,10 @@
 
 #include <fmt/format.h>
 
+#include "core/error.h"
 #include "core/simulate.h"
 #include "fit/coloured_noise.h"
+#include "fit/share_followed.h"
 
 namespace unrig {
 
@@ -23,15 +25,6 @@ double rms(const VectorXd& x, const VectorXd& weight) {
   for (Index k = 0; k < x.size(); ++k)
     if (weight[k] > 0) sum += x[k] * x[k], ++count;
   return count > 0 ? std::sqrt(sum / static_cast<double>(count)) : 0;
-}
-
-/// 1 - what a prediction leaves of a channel's variance, in the samples that count.
-double share_followed(const VectorXd& reading, const VectorXd& predicted, const VectorXd& weight) {
-  const double count = static_cast<double>((weight.array() > 0).count());
-  if (count == 0) return 1;
-  const auto counts = [&](const VectorXd& x) -> VectorXd { return (weight.array() > 0).select(x, 0); };
-  const double mean = counts(reading).sum() / count, varies = rms(reading.array() - mean, weight), left = rms(reading - predicted, weight);
-  return varies > 0 ? 1 - left * left / (varies * varies) : 1;
 }
 
 /// Covariance of all unknowns (zero for those held) once what is held may be off by its ignorance. Unknowns that are lost with it are not identified:
@@ -96,6 +89,20 @@ MatrixXd correlation_of(const MatrixXd& covariance) {
 }
 
 }  // namespace
+
+void check_lengths(const JointProblem& joint) {
+  for (const RunResidual& run : joint.runs())
+    if (run.degrees_of_freedom() <= 0)
+      throw InputError({run.run().file, 0}, fmt::format("{} samples for {} unknowns of the run itself (how it starts, its zeros, its motion)", run.observations(), run.linear_unknowns()),
+                       "wanted more samples than that", "Record for several periods of the rig's lowest mode, or leave the run out.");
+}
+
+std::string too_few_samples(Index observations, Index variables) {
+  constexpr Index enough = 20;
+  const Index freedom = observations - variables;
+  if (freedom >= enough) return "";
+  return fmt::format("{} samples leave {} degrees of freedom beside {} unknowns, too few to tell noise from signal. Record for several periods of the lowest mode.", observations, freedom, variables);
+}
 
 bool FittedRun::explained() const { return reduced_chi2() < 1.2 + 5 * std::sqrt(2 / static_cast<double>(degrees_of_freedom)); }
 
@@ -201,14 +208,11 @@ void describe_profiles(const JointProblem& joint, const ParameterUncertainty& un
 }
 
 void judge_answer(FitResult& result) {
-  constexpr Index enough = 20;
   constexpr double half = 0.5;
-  const Index freedom = result.observations - result.variables;
   const auto known = [](const FittedParameter& p) { return p.identified; };
   const auto lost = std::find_if(result.runs.begin(), result.runs.end(), [](const FittedRun& run) { return run.followed < half && !run.explained(); });
   std::string advice;
-  if (freedom < enough) {
-    result.no_answer = fmt::format("{} samples leave {} degrees of freedom beside {} unknowns, too few to tell noise from signal. Record for several periods of the lowest mode.", result.observations, freedom, result.variables);
+  if (result.no_answer = too_few_samples(result.observations, result.variables); !result.no_answer.empty()) {
     advice = "These runs are too short. ";
   } else if (!result.converged) {
     result.no_answer = "the fit did not converge: " + result.message;

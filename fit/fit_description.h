@@ -1,4 +1,6 @@
 #pragma once
+#include <string>
+
 #include "fit/arrival.h"
 #include "fit/fit.h"
 #include "fit/joint_problem.h"
@@ -24,6 +26,12 @@ void describe_parameters(const JointProblem& joint, const ParameterUncertainty& 
 /// Profile-likelihood intervals of the unknowns that `problem` asks for. Chi-square counts in units of what its rise means: where residuals are coloured,
 /// the coloured variance over the plain one.
 void describe_profiles(const JointProblem& joint, const ParameterUncertainty& uncertainty, const FitProblem& problem, FitResult& result);
+
+/// Throws InputError for a run that its own unknowns take up altogether: it would only seem to be explained.
+void check_lengths(const JointProblem& joint);
+
+/// Why so many samples tell nothing of so many unknowns; empty where they do.
+std::string too_few_samples(Eigen::Index observations, Eigen::Index variables);
 
 /// Whether there is a trustworthy answer (FitResult::no_answer); where not, nothing is identified.
 void judge_answer(FitResult& result);

@@ -459,14 +459,23 @@ RunResidual::Sensitivity RunResidual::sensitivity(const VectorXd& theta) const {
   for (Index c = 0; c < measured_.cols(); ++c) {
     Sensitivity::PerChannel& channel = result.channels[static_cast<std::size_t>(c)];
     channel.residual = weight_.col(c).cwiseProduct(channel.residual + measured_.col(c));
-    channel.slope = weight_.col(c).asDiagonal() * channel.slope;
+    channel.slope.array().colwise() *= weight_.col(c).array();
   }
   if (angle_offset_ >= 0) {
-    const MatrixXd columns = motion_.angle_columns({0, n});
-    const VectorXd predicted = (columns * e.linear.head(motion_.unknowns())).array() + e.linear[angle_offset_];
-    MatrixXd slope = columns * e.linear_slope.topRows(motion_.unknowns());
-    slope.rowwise() += e.linear_slope.row(angle_offset_);
-    result.channels.push_back({angle_weight_.cwiseProduct(angle_ - predicted), angle_weight_.asDiagonal() * slope});
+    Sensitivity::PerChannel angle{VectorXd(n), MatrixXd(n, parameters)};
+    for (const MotionBasis::Phase& phase : phases_) {
+      const Interval& s = phase.samples;
+      const MatrixXd columns = motion_.angle_columns(phase.moving ? s : Interval{s.first, s.first + 1});  // one row for a whole rest
+      const VectorXd predicted = (columns * e.linear.head(motion_.unknowns())).array() + e.linear[angle_offset_];
+      MatrixXd slope = columns * e.linear_slope.topRows(motion_.unknowns());
+      slope.rowwise() += e.linear_slope.row(angle_offset_);
+      const Index times = phase.moving ? 1 : s.length();
+      angle.residual.segment(s.first, s.length()) = predicted.replicate(times, 1);
+      angle.slope.middleRows(s.first, s.length()) = slope.replicate(times, 1);
+    }
+    angle.residual = angle_weight_.cwiseProduct(angle_ - angle.residual);
+    angle.slope.array().colwise() *= angle_weight_.array();
+    result.channels.push_back(std::move(angle));
   }
   return result;
 }

@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "core/effects/effect.h"
+#include "core/error.h"
 #include "core/in_parallel.h"
 #include "fit/decays_first.h"
 #include "fit/diagnose/heldout.h"
@@ -108,6 +109,15 @@ void name_equivalent(const Trial& baseline, const Trial& best, const std::vector
   }
 }
 
+/// So short that nothing missing could be seen: "nothing is missing" would be no answer.
+void refuse_short_runs(const JointProblem& joint) {
+  check_lengths(joint);
+  Index observations = 0, variables = 0;
+  for (const Unknown& u : joint.unknowns()) variables += u.held ? 0 : 1;
+  for (const RunResidual& run : joint.runs()) observations += run.observations(), variables += run.linear_unknowns();
+  if (const std::string why = too_few_samples(observations, variables); !why.empty()) throw NoAnswer(why);
+}
+
 }  // namespace
 
 Diagnosis diagnose(const DiagnoseProblem& problem) {
@@ -122,6 +132,7 @@ Diagnosis diagnose(const DiagnoseProblem& problem) {
 
   tell("fitting the rig with nothing missing");
   const Trial baseline = fit_baseline(fit_problem);
+  refuse_short_runs(baseline.arrival.joint);
   Diagnosis d;
   d.mismatch = locate_mismatch(baseline.arrival.joint);
   if (!problem.verdict_only) d.maps = residual_maps(baseline.arrival.joint, d.mismatch.runs);

@@ -135,6 +135,26 @@ TEST(FitOptions, ARunThatTheModelDoesNotFollowIsNoAnswer) {
   for (const json& p : fit["parameters"]) EXPECT_EQ(p["identified"], false) << p;
 }
 
+TEST(FitOptions, ADecayInALongRecordOfColouredNoiseIsAnAnswer) {
+  const TemporaryDirectory directory;
+  std::mt19937 random(7);
+  std::normal_distribution<double> normal;
+  std::string text = "# unrig_run = 1\n# kind = \"pluck\"\n# density = \"1.2 kg/m^3\"\n# speed = \"0 m/s\"\ntime [s],gauge [N]\n";
+  double coloured = 0;
+  for (int k = 0; k < 60000; ++k) {
+    const double t = 0.005 * k, w = 2 * pi * frequency;
+    coloured = 0.9 * coloured + 0.3 * normal(random);  // standard deviation 0.69 N, differences say a fifth of that
+    text += std::to_string(t) + "," + std::to_string(10 * std::exp(-damping * w * t) * std::cos(w * t) + coloured) + "\n";
+  }
+  const Finished finished = fit_of(directory, directory.file("run.csv", text), {});
+  EXPECT_EQ(finished.status, 0) << finished.err;
+  const json fit = json::parse(read_text(directory.path("fit.json")));
+  EXPECT_EQ(fit["runs"][0]["explained"], false);
+  EXPECT_GT(fit["runs"][0]["followed"], 0.9) << "of all of it only a tenth";
+  const json& ratio = fit["determined"][0];
+  EXPECT_NEAR(ratio["value"].get<double>(), stiffness / mass, 3.5 * ratio["std_error"].get<double>());
+}
+
 /// The first lines of a decay.
 std::string beginning(const TemporaryDirectory& directory, int samples) {
   const std::string text = read_text(decay(directory));

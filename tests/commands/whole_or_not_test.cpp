@@ -5,6 +5,7 @@
 
 #include <cstdio>
 #include <filesystem>
+#include <sstream>
 
 #include "core/text_file.h"
 #include "tests/commands/run_unrig.h"
@@ -101,6 +102,32 @@ TEST(Lengths, ThreeSamplesGetAnAnswerOrAReason) {
   const Finished fitted = run_unrig(directory, {"fit", "--rig", rig, run, "-o", directory.path("fit.json")});
   EXPECT_GE(fitted.status, 0);
   EXPECT_THAT(fitted.err, ::testing::Not(HasSubstr("internal error")));
+}
+
+TEST(Lengths, NothingIsDiagnosedFromNothing) {
+  const TemporaryDirectory directory;
+  const auto first_of = [&](const char* run, int samples) {
+    std::istringstream lines(read_text(null_campaign(run)));
+    std::string text;
+    int rows = -1;  // the header
+    for (std::string line; rows < samples && std::getline(lines, line);) {
+      text += line + "\n";
+      rows += line.starts_with("#") ? 0 : 1;
+    }
+    return directory.file(run, text);
+  };
+  const auto diagnosed = [&](int samples) {
+    return run_unrig(directory, {"diagnose", "--rig", null_campaign("rig.toml"), first_of("step_a.csv", samples), first_of("wet_pluck.csv", samples), "-o", directory.path("diagnosis.json")});
+  };
+  for (const int samples : {3, 4, 8}) {
+    const Finished finished = diagnosed(samples);
+    EXPECT_EQ(finished.status, 2) << samples;
+    EXPECT_THAT(finished.err, HasSubstr("13 unknowns of the run itself"));
+  }
+  const Finished finished = diagnosed(15);
+  EXPECT_EQ(finished.status, 1);
+  EXPECT_THAT(finished.err, HasSubstr("too few to tell noise from signal"));
+  EXPECT_FALSE(std::filesystem::exists(directory.path("diagnosis.json")));
 }
 
 TEST(Lengths, AMillionSamplesFitIntoASixthOfAGigabyte) {
