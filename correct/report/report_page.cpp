@@ -33,6 +33,35 @@ json numbers(const std::vector<double>& values) {
   return out;
 }
 
+/// Rows [first, last) of a plot: where its curves are lowest and highest, and how much the one that varies most does so on the plot's axis.
+struct Stretch {
+  Index first, last;
+  std::vector<Index> extremes;
+  double varies = 0;
+  bool operator<(const Stretch& other) const { return varies < other.varies; }
+};
+
+Stretch stretch_of(const Plot& plot, Index first, Index last) {
+  Stretch stretch{first, last, {}};
+  for (const Curve& curve : plot.curves) {
+    Index low = -1, high = -1;
+    for (Index k = first; k < last; ++k) {
+      const double v = curve.value[k];
+      if (!std::isfinite(v) || (plot.log_y && v <= 0)) continue;
+      if (low < 0 || v < curve.value[low]) low = k;
+      if (high < 0 || v > curve.value[high]) high = k;
+    }
+    if (low < 0) continue;
+    const double l = curve.value[low], h = curve.value[high];
+    stretch.varies = std::max(stretch.varies, plot.log_y ? std::log(h / l) : h - l);
+    stretch.extremes.insert(stretch.extremes.end(), {low, high});
+  }
+  if (stretch.extremes.empty()) stretch.extremes.push_back(first);  // a gap stays a gap
+  std::sort(stretch.extremes.begin(), stretch.extremes.end());
+  stretch.extremes.erase(std::unique(stretch.extremes.begin(), stretch.extremes.end()), stretch.extremes.end());
+  return stretch;
+}
+
 const char* name_of(Tone tone) { return tone == Tone::good ? "good" : tone == Tone::bad ? "bad" : "open"; }
 
 }  // namespace
@@ -57,29 +86,24 @@ void ReportPage::add_table(const std::string& title, const std::vector<std::stri
 std::vector<Index> kept_rows(const Plot& plot, Index most) {
   const Index rows = plot.x.size();
   std::vector<Index> kept;
-  const Index stretches = std::max<Index>(1, most / std::max<Index>(1, 2 * static_cast<Index>(plot.curves.size())));
-  const Index bins = rows > most ? stretches : rows;
-  for (Index b = 0; b < bins; ++b) {
-    const Index first = b * rows / bins, last = (b + 1) * rows / bins;
-    if (last - first == 1) {
-      kept.push_back(first);
-      continue;
-    }
-    std::vector<Index> extremes;
-    for (const Curve& curve : plot.curves) {
-      Index low = -1, high = -1;
-      for (Index k = first; k < last; ++k) {
-        if (!std::isfinite(curve.value[k])) continue;
-        if (low < 0 || curve.value[k] < curve.value[low]) low = k;
-        if (high < 0 || curve.value[k] > curve.value[high]) high = k;
-      }
-      if (low >= 0) extremes.insert(extremes.end(), {low, high});
-    }
-    if (extremes.empty()) extremes.push_back(first);  // a gap stays a gap
-    std::sort(extremes.begin(), extremes.end());
-    extremes.erase(std::unique(extremes.begin(), extremes.end()), extremes.end());
-    kept.insert(kept.end(), extremes.begin(), extremes.end());
+  if (rows <= most) {
+    for (Index k = 0; k < rows; ++k) kept.push_back(k);
+    return kept;
   }
+  const Index most_stretches = std::max<Index>(2, most / std::max<Index>(1, 2 * static_cast<Index>(plot.curves.size()))), even = most_stretches / 2;
+  std::vector<Stretch> stretches;  // a heap: the one that varies most comes first
+  for (Index b = 0; b < even; ++b) stretches.push_back(stretch_of(plot, b * rows / even, (b + 1) * rows / even));
+  std::make_heap(stretches.begin(), stretches.end());
+  while (static_cast<Index>(stretches.size()) < most_stretches && stretches.front().varies > 0) {
+    std::pop_heap(stretches.begin(), stretches.end());
+    const Index first = stretches.back().first, last = stretches.back().last, middle = first + (last - first) / 2;
+    stretches.back() = stretch_of(plot, first, middle);
+    std::push_heap(stretches.begin(), stretches.end());
+    stretches.push_back(stretch_of(plot, middle, last));
+    std::push_heap(stretches.begin(), stretches.end());
+  }
+  for (const Stretch& stretch : stretches) kept.insert(kept.end(), stretch.extremes.begin(), stretch.extremes.end());
+  std::sort(kept.begin(), kept.end());
   return kept;
 }
 
@@ -90,7 +114,7 @@ void ReportPage::add_plot(const Plot& plot) {
   const std::vector<Index> rows = kept_rows(plot, most_rows);
   std::string caption = plot.caption;
   if (static_cast<Index>(rows.size()) < plot.x.size())
-    caption += fmt::format("{}Drawn from {} of {} samples: the extremes of every stretch.", caption.empty() ? "" : " ", rows.size(), plot.x.size());
+    caption += fmt::format("{}Drawn from {} of {} samples: the extremes of every stretch, of shorter ones where more happens.", caption.empty() ? "" : " ", rows.size(), plot.x.size());
   json block = {{"type", "plot"},         {"title", plot.title},    {"x_label", plot.x_label}, {"y_label", plot.y_label}, {"group", plot.group},
                 {"caption", caption},     {"log_x", plot.log_x},    {"log_y", plot.log_y},     {"height", plot.height},   {"series", json::array()},
                 {"x", numbers(plot.x, rows, 9)}};

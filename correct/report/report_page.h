@@ -53,7 +53,7 @@ class ReportPage {
   void add_text(const std::string& text);
   void add_table(const std::string& title, const std::vector<std::string>& header, const std::vector<std::vector<std::string>>& rows, const std::string& caption = "");
   /// Records of more than 6000 samples are thinned to the smallest and the largest value of every curve in each of some 1000 stretches, so
-  /// that no peak is lost, and the caption says so. Throws std::invalid_argument where the lengths differ.
+  /// that no peak is lost, and the caption says so. The stretches are short where the curves vary, down to single samples: a step in a million of them can be zoomed into. Throws std::invalid_argument where the lengths differ.
   void add_plot(const Plot& plot);
   void add_map(const HeatMap& map);
   std::string html() const;
@@ -62,7 +62,7 @@ class ReportPage {
   nlohmann::json data_;
 };
 
-/// Rows of `plot` that stay when it is thinned to about `most`.
+/// Rows of `plot` that stay when it is thinned to `most`: half of the stretches are even, the others come of halving, again and again, the one in which a curve varies most.
 std::vector<Eigen::Index> kept_rows(const Plot& plot, Eigen::Index most);
 
 /// The page with style, script and dygraphs, made at build time from page.html; `/*UNRIG_DATA*/` stands where the data go.

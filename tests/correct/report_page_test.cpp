@@ -44,6 +44,21 @@ TEST(ReportPage, ThinsLongRecordsWithoutLosingAnExtreme) {
   EXPECT_THAT(block["caption"].get<std::string>(), HasSubstr("of 1000000 samples"));
 }
 
+TEST(ReportPage, KeepsTheDetailOfAShortEventInALongRecord) {
+  // Two hundred samples of ringing in a million of noise a hundredth as large.
+  const Index samples = 1'000'000, event = 400'000;
+  VectorXd y(samples);
+  for (Index k = 0; k < samples; ++k) {
+    const double t = static_cast<double>(k - event), noise = 0.01 * std::sin(static_cast<double>(k * k));
+    y[k] = noise + (t >= 0 && t < 200 ? std::sin(0.3 * t) : 0);
+  }
+  const std::vector<Index> rows = kept_rows({"", "time [s]", "gauge [N]", VectorXd::LinSpaced(samples, 0, 1), {{"gauge", 0, y}}}, 6000);
+  EXPECT_LE(rows.size(), 6000u);
+  const auto kept_in = [&](Index first, Index last) { return std::lower_bound(rows.begin(), rows.end(), last) - std::lower_bound(rows.begin(), rows.end(), first); };
+  EXPECT_GT(kept_in(event, event + 200), 150);
+  for (Index first = 0; first < samples; first += samples / 1000) EXPECT_GE(kept_in(first, first + 2 * samples / 1000), 1) << "no stretch is forgotten";
+}
+
 TEST(ReportPage, KeepsShortRecordsAsTheyAre) {
   const Plot plot{"", "x", "y", VectorXd::LinSpaced(3, 0, 1), {{"a", 0, Eigen::Vector3d(1, std::nan(""), 3), Eigen::Vector3d(.1, .2, .3)}}};
   ReportPage page("short");
