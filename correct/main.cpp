@@ -29,7 +29,32 @@ constexpr unrig::Command commands[] = {
 void print_help(std::FILE* stream) {
   std::fputs("unrig: take the rig out of the reading\n\nusage: unrig COMMAND [OPTIONS]\n\n", stream);
   for (const unrig::Command& command : commands) std::fprintf(stream, "  %-14s %s\n", command.name, command.summary);
-  std::fputs("\n`unrig COMMAND --help` explains a command. Exit status: 0 done, 1 no trustworthy answer, 2 wrong use or unusable input.\n", stream);
+  std::fputs(R"(
+`unrig COMMAND --help` explains a command. Exit status: 0 done, 1 no trustworthy answer, 2 wrong use or unusable input.
+
+From the recordings of one rig to a page to look at:
+    unrig fit      --rig rig.toml dry_pluck.csv wet_pluck.csv step_a.csv -o fit.json
+    unrig diagnose --rig rig.toml dry_pluck.csv wet_pluck.csv step_a.csv -o diagnosis.json
+    unrig correct  --rig rig.toml --fit fit.json step_a.csv -o corrected.csv --indicial indicial.csv
+    unrig report   fit.json diagnosis.json corrected.csv indicial.csv -o report.html
+
+A recording (run file) says what it is before its columns; `unrig import` makes one of other formats:
+    # unrig_run = 1
+    # kind = "step"                # or "pluck" (free decay), "forced" (measured force), "moved" (measured motion of the mount)
+    # density = "998.2 kg/m^3"
+    # speed = "0.6 m/s"            # free stream, 0 in a still tank
+    time [s],alpha [deg],gauge [N]
+    0.000,2.076,6.857
+A rig file holds its section, masses, flexibilities and gauge, or only its modes:
+    unrig_rig = 1
+    name = "oscillator"
+    [[modal]]
+    mass = "1 kg"
+    frequency = "7.7 Hz"
+    damping_ratio = 0.01
+    gauge_gain = "1000 N/m"        # reading per unit of modal displacement
+sample_data/campaigns/null has complete ones of a tow-tank rig (once installed: share/doc/unrig/null). Every value has its unit, any that UDUNITS-2 knows.
+)", stream);
 }
 
 }  // namespace

@@ -60,18 +60,22 @@ class Table {
 
   Recording read() {
     if (text_.starts_with("\xEF\xBB\xBF")) text_.remove_prefix(3);
-    if (text_.starts_with("\xFF\xFE") || text_.starts_with("\xFE\xFF")) refuse("the file is in UTF-16", "wanted UTF-8 or ASCII text", "Save it again as UTF-8.");
     std::string_view line;
     for (int i = 0; i < format_.skip_lines; ++i)
       if (!next(line, false)) refuse(fmt::format("the file ends within the {} lines to skip", format_.skip_lines), "wanted a table behind them", "");
     if (!next(line, true)) refuse("the file holds no table", "wanted rows of numbers", "");
     if (format_.delimiter.empty()) format_.delimiter = delimiter_in(line, format_.decimal);
-    if (format_.header) {
-      for (const std::string_view cell : cells_of(line, format_.delimiter)) out_.channels.push_back(named(cell));
-      if (out_.channels.size() > 1 && out_.channels.back().name.empty()) out_.channels.pop_back();  // a delimiter at the end of the row
+    const bool header = format_.header.value_or(!all_numbers(line));
+    if (header) {
+      name_columns(cells_of(line, format_.delimiter));
+      if (next(line, true) && !units_row(line)) row(line);
     } else {
       const std::size_t columns = cells_of(line, format_.delimiter).size();
-      for (std::size_t c = 0; c < columns; ++c) out_.channels.push_back({fmt::format("{}", c + 1), "", {}, "", 0, 0});
+      std::string_view remark = trimmed(remark_);
+      remark.remove_prefix(std::min(remark.find_first_not_of("#%"), remark.size()));
+      const std::vector<std::string_view> names = cells_of(trimmed(remark), format_.delimiter);
+      if (columns > 1 && names.size() == columns) name_columns(names);
+      else for (std::size_t c = 0; c < columns; ++c) out_.channels.push_back({fmt::format("{}", c + 1), "", {}, "", 0, 0});
       row(line);
     }
     while (next(line, true)) row(line);
@@ -90,9 +94,42 @@ class Table {
       ++line_;
       if (line.ends_with('\r')) line.remove_suffix(1);
       const std::string_view content = trimmed(line);
-      if (!skip_remarks || !(content.empty() || content.front() == '#' || content.front() == '%')) return true;
+      const bool is_remark = !content.empty() && (content.front() == '#' || content.front() == '%');
+      if (!skip_remarks || !(content.empty() || is_remark)) return true;
+      if (is_remark) remark_ = line;
     }
     return false;
+  }
+
+  void name_columns(const std::vector<std::string_view>& cells) {
+    for (const std::string_view cell : cells) out_.channels.push_back(named(cell));
+    if (out_.channels.size() > 1 && out_.channels.back().name.empty()) out_.channels.pop_back();  // a delimiter at the end of the row
+  }
+
+  bool is_number(std::string_view cell) const {
+    std::string copy(cell);
+    if (format_.decimal == ",") std::replace(copy.begin(), copy.end(), ',', '.');
+    double value = 0;
+    return !copy.empty() && read_number(copy.data(), copy.data() + copy.size(), value) == copy.data() + copy.size();
+  }
+
+  bool all_numbers(std::string_view line) const {
+    const std::vector<std::string_view> cells = cells_of(line, format_.delimiter);
+    return std::all_of(cells.begin(), cells.end(), [&](std::string_view cell) { return cell.empty() || is_number(cell); });
+  }
+
+  /// Takes a row below a header without units that holds no number and no gap for the units.
+  bool units_row(std::string_view line) {
+    const std::vector<std::string_view> cells = cells_of(line, format_.delimiter);
+    if (cells.size() < out_.channels.size()) return false;
+    for (std::size_t c = 0; c < cells.size(); ++c)
+      if (c < out_.channels.size() ? cells[c].empty() || is_number(cells[c]) || !out_.channels[c].unit.empty() : !cells[c].empty()) return false;
+    for (std::size_t c = 0; c < out_.channels.size(); ++c) {
+      std::string_view unit = cells[c];
+      if (unit.size() > 2 && ((unit.front() == '[' && unit.back() == ']') || (unit.front() == '(' && unit.back() == ')'))) unit = trimmed(unit.substr(1, unit.size() - 2));
+      out_.channels[c].unit = unit;
+    }
+    return true;
   }
 
   void row(std::string_view line) {
@@ -114,13 +151,42 @@ class Table {
     return value;
   }
 
-  std::string_view text_;
+  std::string_view text_, remark_;  // remark_: the last one
   DelimitedFormat format_;
   int line_ = 0;
   Recording out_;
 };
 
 }  // namespace
+
+std::string in_utf8(std::string text) {
+  const auto byte = [&](std::size_t i) { return static_cast<unsigned char>(text[i]); };
+  std::string out;
+  const auto add = [&](unsigned code) {  // below 65536
+    if (code < 0x80) out += static_cast<char>(code);
+    else if (code < 0x800) (out += static_cast<char>(0xC0 | code >> 6)) += static_cast<char>(0x80 | (code & 0x3F));
+    else ((out += static_cast<char>(0xE0 | code >> 12)) += static_cast<char>(0x80 | (code >> 6 & 0x3F))) += static_cast<char>(0x80 | (code & 0x3F));
+  };
+  if (const bool little = text.starts_with("\xFF\xFE"); little || text.starts_with("\xFE\xFF")) {
+    for (std::size_t i = 2; i + 1 < text.size(); i += 2) {
+      const unsigned code = little ? byte(i) | byte(i + 1) << 8U : byte(i) << 8U | byte(i + 1);
+      add(code >= 0xD800 && code < 0xE000 ? '?' : code);  // pairs of surrogates name no unit
+    }
+    return out;
+  }
+  for (std::size_t i = 0; i < text.size(); ++i) {
+    if (byte(i) < 0x80) continue;
+    const std::size_t more = byte(i) >= 0xF0 ? 3 : byte(i) >= 0xE0 ? 2 : byte(i) >= 0xC2 ? 1 : 0;
+    bool whole = more > 0 && byte(i) < 0xF5 && i + more < text.size();
+    for (std::size_t k = 1; whole && k <= more; ++k) whole = (byte(i + k) & 0xC0) == 0x80;
+    if (!whole) {
+      for (std::size_t k = 0; k < text.size(); ++k) add(byte(k));
+      return out;
+    }
+    i += more;
+  }
+  return text;
+}
 
 Recording read_delimited(std::string_view text, const std::string& file, const DelimitedFormat& format) { return Table(text, file, format).read(); }
 

@@ -1,4 +1,5 @@
 #pragma once
+#include <optional>
 #include <string>
 #include <string_view>
 
@@ -11,12 +12,16 @@ struct DelimitedFormat {
   std::string delimiter;      ///< one character, or "blanks" for any number of blanks; empty: what the header row has most of among tab ; , and blanks
   std::string decimal = ".";  ///< or ","
   int skip_lines = 0;         ///< before the header, or before the numbers where there is no header
-  bool header = true;
+  std::optional<bool> header;  ///< whether a row of names comes first; empty: it does, unless that row holds nothing but numbers
 };
 
-/// Reads a table of numbers in text. A header names the columns, with the unit in brackets or parentheses ("Force [N]", "Force (N)"); without one
+/// Reads a table of numbers in text. A header names the columns, with the unit in brackets or parentheses ("Force [N]", "Force (N)") or all units in a row of
+/// their own below it; without one the remark right before the numbers does where it has as many words as they have columns (NumPy writes such), else
 /// they are "1", "2", ... Cells that are empty or nan are missing; lines that begin with # or % are left out.
 /// Throws InputError, with the line, for text where a number should stand, rows of another length than the first, and what has no rows.
 Recording read_delimited(std::string_view text, const std::string& file, const DelimitedFormat& format = {});
+
+/// The text in UTF-8: out of UTF-16 where it begins with that encoding's mark, out of Latin-1 where it is no UTF-8 (degree signs of older programs).
+std::string in_utf8(std::string text);
 
 }  // namespace unrig

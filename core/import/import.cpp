@@ -4,6 +4,7 @@
 #include <cmath>
 #include <iterator>
 #include <optional>
+#include <utility>
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
@@ -182,7 +183,7 @@ Imported import_recording(const Recording& recording, const std::string& mapping
 }
 
 Recording read_recording(const std::string& path, const std::string& mapping_text, const std::string& mapping_file) {
-  const std::string bytes = read_text(path);
+  std::string bytes = read_text(path);
   const TomlTable mapping = parse_mapping(mapping_text, mapping_file);
   if (bytes.starts_with("TDSm")) return read_tdms(bytes, path);
   if (bytes.size() > 520 && bytes.compare(512, 4, "\x89HDF") == 0) return read_mat73(path);
@@ -192,6 +193,7 @@ Recording read_recording(const std::string& path, const std::string& mapping_tex
   const std::string_view first = std::string_view(bytes).substr(0, bytes.find('\n'));
   if (first.find_first_not_of(" \r") != std::string_view::npos && first.substr(first.find_first_not_of(" ")).starts_with("-1") && first.size() <= 82 && first.find_first_of(",;\t") == std::string_view::npos)
     return read_uff(bytes, path);
+  bytes = in_utf8(std::move(bytes));
   if (bytes.find('\0') != std::string::npos) throw InputError({path, 0}, "the file is binary, and in no format that is known here", "wanted TDMS, MATLAB 5 or 7.3, universal file 58, or text", "");
   DelimitedFormat format;
   if (mapping.has("format")) {
@@ -203,7 +205,7 @@ Recording read_recording(const std::string& path, const std::string& mapping_tex
     if (format.decimal != "." && format.decimal != ",") table.fail("decimal", fmt::format("the decimal sign is \"{}\"", format.decimal), "wanted \".\" or \",\"");
     if (format.decimal == format.delimiter) table.fail("decimal", "decimal sign and delimiter are the same", "wanted two different ones");
     if (table.has("skip_lines")) format.skip_lines = table.integer("skip_lines");
-    format.header = table.boolean_or("header", true);
+    if (table.has("header")) format.header = table.boolean_or("header", true);
   }
   return read_delimited(bytes, path, format);
 }

@@ -19,12 +19,12 @@ using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 using ::testing::Not;
 
-/// The commands that `unrig --help` lists: indented lines, first word.
+/// The commands that `unrig --help` lists: lines indented by two, first word.
 std::vector<std::string> listed_commands(const std::string& help) {
   std::vector<std::string> names;
   std::istringstream lines(help);
   for (std::string line; std::getline(lines, line);) {
-    if (!line.starts_with("  ")) continue;
+    if (!line.starts_with("  ") || line.starts_with("   ")) continue;
     std::istringstream words(line);
     words >> names.emplace_back();
   }

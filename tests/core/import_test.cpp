@@ -103,6 +103,9 @@ TEST(Delimited, FindsDelimiterAndUnits) {
            {"Time [s],Force (N)\n0,1.5\n1,-2\n2,3e3\n", {}},
            {"Time [s];Force [N];\r\n0,0;1,5;\r\n1,0;-2;\r\n2,0;3e3;\r\n", {"", ",", 0, true}},
            {"Time [s]\tForce [N]\n0\t1.5\n1\t-2\n2\t3e3", {}},
+           {"Time\tForce\ns\tN\n0\t1.5\n1\t-2\n2\t3e3\n", {}},
+           {"Time;Force;\n[s];(N);\n0;1.5;\n1;-2;\n2;3e3;\n", {}},
+           {"# by numpy.savetxt\n# Time[s] Force[N]\n0 1.5\n1 -2\n2 3e3\n", {}},
            {"Logger 7\n\nTime[s]  Force[N]\n 0  1.5\n 1  -2\n# remark\n 2  3e3\n", {"", ".", 2, true}},
            {"\xEF\xBB\xBF\"Time [s]\",\"Force [N]\"\n\"0\",\"1.5\"\n1,-2\n2,3e3\n", {}}}) {
     const Recording r = read_delimited(text, "f", format);
@@ -111,10 +114,26 @@ TEST(Delimited, FindsDelimiterAndUnits) {
     EXPECT_EQ(r.channels[1].unit, "N");
     EXPECT_EQ(r.channels[1].value, force) << text;
   }
-  const Recording bare = read_delimited("1 2\n3 nan\n", "f", {"", ".", 0, false});
-  EXPECT_EQ(bare.channels[0].name, "1");
-  EXPECT_EQ(bare.channels[0].value, (Values{1, 3}));
-  EXPECT_TRUE(std::isnan(bare.channels[1].value[1]));
+  for (const DelimitedFormat& format : {DelimitedFormat{"", ".", 0, false}, DelimitedFormat{}}) {  // said, or found out
+    const Recording bare = read_delimited("# a remark of five words\n1 2\n3 nan\n", "f", format);
+    EXPECT_EQ(bare.channels[0].name, "1");
+    EXPECT_EQ(bare.channels[0].value, (Values{1, 3}));
+    EXPECT_TRUE(std::isnan(bare.channels[1].value[1]));
+  }
+  EXPECT_EQ(read_delimited("1,2\n3,4\n", "f", {"", ".", 0, true}).channels[1].name, "2") << "names that are numbers, if they are said to be names";
+}
+
+TEST(Delimited, ReadsOtherEncodings) {
+  const std::string utf8 = "angle(\xC2\xB0)\n1\n", latin1 = "angle(\xB0)\n1\n";
+  std::string little = "\xFF\xFE", big = "\xFE\xFF";
+  for (const char c : latin1) (little += c) += '\0', (big += '\0') += c;
+  for (const std::string& text : {utf8, latin1, little, big}) {
+    EXPECT_EQ(in_utf8(text), utf8);
+    EXPECT_EQ(read_delimited(in_utf8(text), "f").channels[0].unit, "\xC2\xB0");
+  }
+  EXPECT_EQ(in_utf8("\xFF\xFE" "a"), "") << "half a letter";
+  EXPECT_EQ(in_utf8("\xE2\x82"), "\xC3\xA2\xC2\x82") << "cut within a letter: no UTF-8";
+  EXPECT_EQ(in_utf8("\xE2\x82\xAC"), "\xE2\x82\xAC");
 }
 
 TEST(Delimited, RefusesWhatIsNoTable) {
@@ -122,6 +141,8 @@ TEST(Delimited, RefusesWhatIsNoTable) {
   EXPECT_THAT(complaint([] { read_delimited("a,b\n", "f"); }), HasSubstr("no rows"));
   EXPECT_THAT(complaint([] { read_delimited("a,b\n1,2\n3\n", "f.txt"); }), HasSubstr("f.txt:3"));
   EXPECT_THAT(complaint([] { read_delimited("a,b\n1,two\n", "f"); }), HasSubstr("\"two\""));
+  EXPECT_THAT(complaint([] { read_delimited("a,b\ns,N\n1,2\nx,y\n", "f"); }), HasSubstr("\"x\""));
+  EXPECT_THAT(complaint([] { read_delimited("a [s],b\ns,N\n1,2\n", "f"); }), HasSubstr("\"s\"")) << "units twice";
   EXPECT_THAT(complaint([] { read_delimited("a;b\n1,5;2\n", "f"); }), HasSubstr("decimal"));
 }
 
