@@ -171,7 +171,8 @@ TEST(FitOptions, ARunOfFewSamplesIsRefused) {
   const Finished some = fit_of(directory, beginning(directory, 20), {});
   EXPECT_EQ(some.status, 1);
   EXPECT_THAT(some.err, ::testing::AllOf(HasSubstr("no trustworthy answer: 20 samples leave"), HasSubstr("Record for several periods")));
-  for (const json& p : json::parse(read_text(directory.path("fit.json")))["parameters"]) EXPECT_EQ(p["identified"], false) << p;
+  const json fit = json::parse(read_text(directory.path("fit.json")));
+  for (const json& p : fit["parameters"]) EXPECT_EQ(p["identified"], false) << p;
   EXPECT_EQ(fit_of(directory, beginning(directory, 200), {}).status, 0) << "five periods";
 }
 

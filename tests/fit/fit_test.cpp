@@ -100,7 +100,7 @@ TEST(Fit, TellsWhatARunDetermines) {
   const FitResult dry = fit(null_problem({"dry_pluck"}));
   EXPECT_TRUE(parameter(dry, "normal.stiffness_scale").identified);
   const FittedParameter& mass = parameter(dry, "apparent_mass_coefficient");
-  const FittedParameter& best = parameter(fit(null_problem({"dry_pluck", "wet_pluck"})), "apparent_mass_coefficient");
+  const FittedParameter best = parameter(fit(null_problem({"dry_pluck", "wet_pluck"})), "apparent_mass_coefficient");
   EXPECT_LT(std::abs(mass.value - best.value), 3 * mass.std_error);
   EXPECT_GT(mass.std_error, 100 * best.std_error) << "the decay in water is what measures it";
   for (const FittedParameter& p : dry.parameters) EXPECT_NE(p.name, "normal_force_slope");
