@@ -10,6 +10,7 @@
 #include <numbers>
 #include <random>
 
+#include "core/error.h"
 #include "core/simulate.h"
 #include "tests/correct/null_campaign.h"
 
@@ -97,6 +98,26 @@ TEST(RestlessRun, SlopesOfChiSquareAreItsDifferences) {
     const double difference = (run.solve(up).chi2 - run.solve(down).chi2) / (2 * h);
     // Beside truncation, h^2: the uncertainty of the first state depends on theta, which the slope leaves out; 4e-3 measured in so short a record.
     EXPECT_NEAR(gradient[j], difference, 0.01 * std::abs(difference)) << name << " off by " << gradient[j] / difference - 1;
+  }
+}
+
+/// The settled filter is for linear rigs, and 400 knots do not follow such a motion: it must say so, and what to do.
+TEST(Restless, ANonlinearForceIsRefusedWithAdvice) {
+  const Recorded r = record(&sine, 10000);
+  FittedRig fit = test::null_fit();
+  fit.effects = {"coulomb-friction"};
+  for (const char* name : {"coulomb-friction.force", "coulomb-friction.velocity"}) {
+    fit.parameters.emplace_back();
+    fit.parameters.back().name = name;
+    fit.parameters.back().value = 0.1;
+  }
+  fit.correlation = Eigen::MatrixXd::Identity(static_cast<Index>(fit.parameters.size()), static_cast<Index>(fit.parameters.size()));
+  try {
+    correct({test::null_rig(), fit, r.run, 0});
+    FAIL() << "corrected";
+  } catch (const NoAnswer& refusal) {
+    EXPECT_THAT(refusal.what(), HasSubstr("nonlinear force"));
+    EXPECT_THAT(refusal.what(), HasSubstr("in parts of at most 3200 samples"));
   }
 }
 
