@@ -21,8 +21,9 @@ struct DecaysLeft {
 /// chi-square has minima everywhere, because a small error of theta grows along the record. So theta and the trajectories are first searched side by side with
 /// laws that are trusted more and more (fit/law_smoother.h), from the present size of the effect (its first parameter) and from the first values of parameters that
 /// have gone astray; from there theta and the linear unknowns c are searched side by side with the model itself. Where that does not follow the decays, once more from
-/// a smaller and a larger size. A large trajectory that crosses the corners of a law for seconds tells errors of theta from each other as little as chance does: where a
-/// law that takes small steps cannot be followed to the noise, it is asked what it leaves when it is trusted to within some percents.
+/// a smaller and a larger size. A large trajectory that crosses the corners of a law for seconds tells errors of theta from each other as little as chance does, and has least chi-squares
+/// everywhere: of the ways to a law that takes small steps the one that leaves least is kept, and where none leaves less than half as much again as the noise, the law is asked what it leaves
+/// when it is trusted to within some percents.
 DecaysLeft fit_decays(JointProblem& joint, const std::string& id);
 
 }  // namespace unrig
