@@ -122,7 +122,7 @@ class GrowingTrust {
       right.segment(static_cast<Index>(d) * count, count) = known.right;
     });
     VectorXd change = VectorXd::Zero(count);
-    if (move) {
+    if (move && count > 0) {
       constexpr double share = 0.5, hardly = 1e-9;
       const VectorXd now = values();
       for (Index i = 0; i < count; ++i) rows(count * runs + i, i) = now[i] != 0 ? 1 / (share * std::abs(now[i])) : hardly * rows.col(i).norm() + 1e-300;

@@ -116,6 +116,14 @@ TEST(DecaysFirst, WhatARunHasToItselfStaysWhenTheRigGoesBack) {
   EXPECT_FALSE(back_to_the_rig(joint, 2));
 }
 
+/// A model that runs away from its start leaves nothing to search: all its unknowns are held.
+TEST(DecaysFirst, NothingFreeIsNothingToSearch) {
+  const Hidden hidden = hide("coulomb-friction", 702, 4);
+  Trial trial = prepare(*hidden.problem, hidden.baseline, {"coulomb-friction"});
+  for (Unknown& u : trial.arrival.joint.unknowns()) u.held = true;
+  EXPECT_GT(fit_decays(trial.arrival.joint, "coulomb-friction").chi2, 1.15) << "what counts as explained";
+}
+
 TEST(DecaysFirst, FrictionThatStopsTheRigIsFoundFromARigThatIsFarOff) {
   // Without friction the fit reads its decay as strong damping. The campaign is simulated in quarter samples.
   const Hidden hidden = hide("coulomb-friction", 6, 0);
