@@ -252,12 +252,25 @@ RunResidual RunResidual::with_motion(std::vector<MotionBasis::Window> windows) c
 
 void RunResidual::settle_noise(const VectorXd& theta) {
   const Prediction p = predict(theta);
+  // Knots as close as samples take up to half of the noise of both channels while the shaft moves.
+  std::vector<bool> at_rest(static_cast<std::size_t>(run_->samples()), false);
+  for (const MotionBasis::Phase& phase : phases_)
+    if (!phase.moving) std::fill(at_rest.begin() + phase.samples.first, at_rest.begin() + phase.samples.last, true);
   const auto settle = [&](const std::string& channel, VectorXd residual, Eigen::Ref<VectorXd> weight, double& sigma) {
+    const auto counts = [&](Index k) { return weight[k] > 0 && std::isfinite(residual[k]); };
+    Index all = 0, resting = 0;
     for (Index k = 0; k < residual.size(); ++k)
-      if (weight[k] == 0) residual[k] = std::nan("");
+      if (counts(k)) ++all, resting += at_rest[static_cast<std::size_t>(k)] ? 1 : 0;
+    constexpr Index enough = 100;  // samples, for a level to 9 %
+    const bool rests = resting >= enough;
+    if (!rests && all <= unknowns_) return;
+    for (Index k = 0; k < residual.size(); ++k)
+      if (!counts(k) || (rests && !at_rest[static_cast<std::size_t>(k)])) residual[k] = std::nan("");
+    // Of a shaft that hardly rests, all unknowns may have taken their share from this channel.
+    const double taken = rests ? 1 : std::sqrt(static_cast<double>(all) / static_cast<double>(all - unknowns_));
     constexpr double chance = 0.06;  // two standard deviations between the two estimates for some thousand samples
     const double third = noise_level(residual, 3), first = noise_level(residual, 1);
-    const double level = std::max(first < (1 + chance) * third ? first : third, least_noise(run_->channel(channel).value));
+    const double level = std::max(taken * (first < (1 + chance) * third ? first : third), least_noise(run_->channel(channel).value));
     if (!(level > 0) || level >= sigma) return;
     weight *= sigma / level;
     sigma = level;
