@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 
 #include "core/spectrum.h"
 
@@ -32,11 +33,16 @@ VectorXd smoothed_power(const VectorXcd& lines, const VectorXd& left, double sam
   return running_mean(lines.cwiseAbs2() / samples, half).cwiseQuotient(running_mean(left, half));
 }
 
-/// 1 - h of each line: nothing of the mean, which the offset takes, and at least a tenth of the others, because where the fit takes nearly all of the
-/// noise, what it leaves tells nothing.
-VectorXd left_of_lines(const MatrixXcd& slopes, const MatrixXd& inverse) {
-  const VectorXd leverage = slopes.conjugate().cwiseProduct(slopes * inverse).rowwise().sum().real();
-  VectorXd left = (1 - leverage.array()).cwiseMax(0.1);
+/// 1 - h of each line, over the samples in which there is a residual: what theta takes, by way of the slopes, and the offset that is eliminated. Nothing of the mean, and at least a
+/// tenth of the others, because where the fit takes nearly all of the noise, what it leaves tells nothing.
+VectorXd left_of_lines(const RunResidual::Sensitivity::PerChannel& channel, const VectorXd& residual, double counted, const MatrixXd& inverse, double offset_variance) {
+  const auto there = [&](const auto& column) { return fourier((residual.array() != 0).select(column, 0)); };
+  const VectorXcd offset = there(channel.into_offset);
+  MatrixXcd slopes(offset.size(), channel.slope.cols());
+  for (Index j = 0; j < slopes.cols(); ++j) slopes.col(j) = there(channel.slope.col(j));
+  VectorXd taken = slopes.conjugate().cwiseProduct(slopes * inverse).rowwise().sum().real();
+  if (offset_variance > 0) taken += offset.cwiseAbs2() / offset_variance;
+  VectorXd left = (1 - taken.array() / counted).cwiseMax(0.1);
   left[0] = 0;
   return left;
 }
@@ -71,22 +77,27 @@ double kolmogorov(double x) {
 
 }  // namespace
 
-ColouredCovariance coloured_covariance(const RunResidual::Sensitivity& sensitivity, const MatrixXd& influence, const MatrixXd& inverse) {
+ColouredCovariance coloured_covariance(const RunResidual::Sensitivity& sensitivity, const std::vector<VectorXd>& residuals, const MatrixXd& influence, Index offset, const MatrixXd& inverse) {
   constexpr Index half = 3;  // seven lines: the spectrum to 38 %, standard errors to 19 %, and lines as narrow as a resonance are kept
   ColouredCovariance sum{MatrixXd::Zero(influence.rows(), influence.rows()), VectorXd::Zero(influence.rows())};
-  for (const auto& channel : sensitivity.channels) {
-    const auto counted = static_cast<double>((channel.residual.array() != 0).count());
-    if (counted == 0 || channel.slope.squaredNorm() == 0) continue;
-    const auto samples = static_cast<double>(channel.residual.size());
-    MatrixXcd slopes(channel.residual.size() / 2 + 1, channel.slope.cols());
+  double offset_variance = 0;  // at fixed theta, of white noise
+  for (const auto& channel : sensitivity.channels) offset_variance += channel.into_offset.squaredNorm();
+  for (std::size_t c = 0; c < residuals.size(); ++c) {
+    const VectorXd& residual = residuals[c];
+    const auto& channel = sensitivity.channels[c];
+    const auto counted = static_cast<double>((residual.array() != 0).count());
+    if (counted == 0 || (channel.slope.squaredNorm() == 0 && channel.into_offset.squaredNorm() == 0)) continue;
+    const auto samples = static_cast<double>(residual.size());
+    const VectorXd power = smoothed_power(fourier(residual), left_of_lines(channel, residual, counted, inverse, offset_variance), counted, half)
+                               .cwiseMax(autoregressive_power(residual, counted, residual.size() / 2 + 1));
+    MatrixXcd slopes(power.size(), channel.slope.cols());
     for (Index j = 0; j < slopes.cols(); ++j) slopes.col(j) = fourier(channel.slope.col(j));
-    const VectorXd power = smoothed_power(fourier(channel.residual), left_of_lines(slopes, inverse / samples), counted, half)
-                               .cwiseMax(autoregressive_power(channel.residual, counted, slopes.rows()));
     VectorXd sides = VectorXd::Constant(power.size(), 2 / samples);  // every line but these two stands for its mirror image too
     sides[0] = 1 / samples;
-    if (channel.residual.size() % 2 == 0) sides[sides.size() - 1] = 1 / samples;
+    if (residual.size() % 2 == 0) sides[sides.size() - 1] = 1 / samples;
     const VectorXd weight = power.cwiseProduct(sides);
-    const MatrixXcd through = slopes * influence.transpose();
+    MatrixXcd through = slopes * influence.transpose();
+    through.col(offset) += fourier(channel.into_offset);
     sum.covariance += (through.adjoint() * weight.asDiagonal() * through).real();
     for (Index a = 0; a < through.cols(); ++a) {
       // What the power of each single line adds to the variance, by way of all the averages that it is in.
@@ -108,19 +119,25 @@ MatrixXd ColouredCovariance::with_its_own_error() const {
   return factor.asDiagonal() * covariance * factor.asDiagonal();
 }
 
-double power_at_zero(const VectorXd& residual) {
-  const auto counted = static_cast<double>((residual.array() != 0).count());
-  const VectorXcd lines = fourier(residual);
-  constexpr Index low = 7;
-  const Index used = std::min(low, lines.size() - 1);
-  if (counted == 0 || used < 1) return 1;
-  return std::max(lines.segment(1, used).squaredNorm() / (static_cast<double>(used) * counted), autoregressive_power(residual, counted, 1)[0]);
+VectorXd residual_at_rest(const VectorXd& residual, const std::vector<MotionBasis::Phase>& phases, Index unknowns) {
+  VectorXd resting = residual;
+  for (const MotionBasis::Phase& phase : phases)
+    if (phase.moving) resting.segment(phase.samples.first, phase.samples.length()).setZero();
+  const auto counted = [](const VectorXd& x) { return static_cast<double>((x.array() != 0).count()); };
+  constexpr double enough = 100;  // samples
+  const double all = counted(residual), rests = counted(resting);
+  if (rests == all) return residual;
+  if (rests < enough) return std::sqrt(all / std::max(all - static_cast<double>(unknowns), 0.1 * all)) * residual;
+  return resting.squaredNorm() / rests >= residual.squaredNorm() / all ? resting : residual;
 }
 
-double whiteness(const RunResidual::Sensitivity& sensitivity) {
+double whiteness(const std::vector<VectorXd>& residuals) {
   double least = 1;
-  for (const auto& channel : sensitivity.channels) {
-    const VectorXd power = fourier(channel.residual).cwiseAbs2();
+  for (const VectorXd& residual : residuals) {
+    std::vector<double> there;  // without what is left out
+    std::copy_if(residual.begin(), residual.end(), std::back_inserter(there), [](double x) { return x != 0; });
+    if (there.empty()) continue;
+    const VectorXd power = fourier(Eigen::Map<const VectorXd>(there.data(), static_cast<Index>(there.size()))).cwiseAbs2();
     const Index lines = power.size() - 2;  // neither the mean nor the last line
     if (lines < 8) continue;
     const double total = power.segment(1, lines).sum();
@@ -131,7 +148,7 @@ double whiteness(const RunResidual::Sensitivity& sensitivity) {
     }
     least = std::min(least, kolmogorov(std::sqrt(static_cast<double>(lines)) * distance));
   }
-  return std::min(1.0, least * static_cast<double>(sensitivity.channels.size()));
+  return std::min(1.0, least * static_cast<double>(residuals.size()));
 }
 
 }  // namespace unrig

@@ -3,6 +3,7 @@
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 
 #include <fmt/format.h>
 
@@ -27,12 +28,14 @@ double rms(const VectorXd& x, const VectorXd& weight) {
   return count > 0 ? std::sqrt(sum / static_cast<double>(count)) : 0;
 }
 
-/// Covariance of all unknowns (zero for those held) once what is held may be off by its ignorance. Unknowns that are lost with it are not identified:
-/// their covariance stays what it is with the others held.
+/// Covariance of all unknowns (zero for those held), and behind them of the first offset of each run, once what is held may be off by its ignorance. Unknowns that are lost with it are
+/// not identified: their covariance stays what it is with the others held.
 MatrixXd covariance_of_all(const JointProblem& joint, const ParameterUncertainty& uncertainty, const HeldInfluence& influence, std::vector<bool>& identified) {
-  const auto all = static_cast<Index>(joint.unknowns().size());
-  MatrixXd covariance = MatrixXd::Zero(all, all), shift = influence.shift;
-  covariance(uncertainty.free, uncertainty.free) = uncertainty.covariance();
+  const auto all = static_cast<Index>(joint.unknowns().size()), runs = static_cast<Index>(joint.runs().size());
+  MatrixXd covariance = MatrixXd::Zero(all + runs, all + runs), shift = influence.shift;
+  std::vector<Index> place = uncertainty.free;
+  for (Index r = 0; r < runs; ++r) place.push_back(all + r);
+  covariance(place, place) = uncertainty.with_offsets();
   for (Index i : uncertainty.free) {
     const Unknown& u = joint.unknowns()[static_cast<std::size_t>(i)];
     constexpr double most_of_it = 0.45;  // one in proportion to a held one is off by half of itself
@@ -41,43 +44,31 @@ MatrixXd covariance_of_all(const JointProblem& joint, const ParameterUncertainty
     identified[static_cast<std::size_t>(i)] = false;
     shift.row(i).setZero();
   }
-  return covariance + shift * shift.transpose();
+  MatrixXd off(all + runs, shift.cols());
+  off << shift, uncertainty.offset_slope * shift;
+  return covariance + off * off.transpose();
 }
 
-/// Steady load before the motion as a coefficient: the constant part of the gauge over what a unit coefficient on all strips would read. The
-/// gauge's own zero cannot be told from it. `covariance`: of all unknowns and of the steady loads so far; grows by this one.
-///
-/// The offset c of the gauge is a linear unknown that follows theta: var(c) = var(c at fixed theta) + (dc/dtheta) cov(theta) (dc/dtheta)^T. At fixed theta it is
-/// all but a mean of the residual, whose variance goes with the residual's spectrum at frequency zero.
-void add_steady_load(const JointProblem& joint, std::size_t run, bool coloured, MatrixXd& covariance, FitResult& result) {
-  const RunResidual& residual = joint.runs()[run];
+/// What a steady load before the motion reads in a run, per unit coefficient on all strips; 0 where there is none, or no gauge that shows it.
+double reading_of_steady_load(const RunResidual& residual) {
   const Rig& rig = residual.model().rig();
   const Conditions& c = residual.conditions();
-  if (rig.is_modal() || rig.gauge_element == 0 || c.speed == 0 || residual.channels().front() != "gauge") return;
-  const double unit_reading = gauge_reading_of_unit_coefficient(rig, c.density, c.speed);
-  const VectorXd theta = joint.theta(run);
-  const RunResidual::Evaluation e = residual.evaluate(theta, Partials::all);
-  const Index column = residual.first_offset(), known = covariance.rows();
-  const VectorXd half = e.linear_factor.triangularView<Eigen::Upper>().transpose().solve(VectorXd::Unit(e.linear.size(), column));
-  const double factor = coloured ? power_at_zero(residual.sensitivity(theta).channels.front().residual) : std::max(1.0, result.runs[run].reduced_chi2());
-  VectorXd follows = VectorXd::Zero(known);
-  for (std::size_t i = 0; i < joint.unknowns().size(); ++i)
-    if (const Unknown& u = joint.unknowns()[i]; u.run < 0 || u.run == static_cast<int>(run)) follows[static_cast<Index>(i)] = e.linear_slope(column, u.parameter) / unit_reading;
-  const VectorXd shared = covariance * follows;
-  const double own = half.squaredNorm() / (unit_reading * unit_reading);
-  covariance.conservativeResize(known + 1, known + 1);
-  covariance.row(known).head(known) = shared.transpose();
-  covariance.col(known).head(known) = shared;
-  covariance(known, known) = factor * own + follows.dot(shared);
+  if (rig.is_modal() || rig.gauge_element == 0 || c.speed == 0 || residual.channels().front() != "gauge") return 0;
+  return gauge_reading_of_unit_coefficient(rig, c.density, c.speed);
+}
 
+/// Steady load before the motion as a coefficient: the offset of the gauge. The gauge's own zero cannot be told from it. The variances are the offset's.
+FittedParameter steady_load(const RunResidual& residual, const VectorXd& theta, double unit_reading, double variance, double white, double coloured) {
   FittedParameter steady;
   steady.name = "steady_normal_force";
   steady.unit = "1";
   steady.run = residual.run().file;
-  steady.value = e.linear[column] / unit_reading;
-  steady.std_error = std::sqrt(covariance(known, known));
+  steady.value = residual.evaluate(theta, Partials::none).linear[residual.first_offset()] / unit_reading;
+  steady.std_error = std::sqrt(variance) / unit_reading;
+  steady.std_error_white = std::sqrt(white) / unit_reading;
+  steady.std_error_coloured = std::sqrt(coloured) / unit_reading;
   steady.start = 0;
-  result.parameters.push_back(steady);
+  return steady;
 }
 
 /// 1 on the diagonal, 0 beside what was held.
@@ -143,7 +134,7 @@ void describe_parameters(const JointProblem& joint, const ParameterUncertainty& 
   const auto all = static_cast<Index>(joint.unknowns().size());
   const HeldInfluence influence = held_influence(joint);
   std::vector<bool> identified(joint.unknowns().size(), true);
-  MatrixXd covariance = covariance_of_all(joint, uncertainty, influence, identified);
+  const MatrixXd covariance = covariance_of_all(joint, uncertainty, influence, identified);
   MatrixXd with_others_held = MatrixXd::Zero(all, all);
   with_others_held(uncertainty.free, uncertainty.free) = uncertainty.covariance();
   result.determined = determined_combinations(joint, influence, with_others_held);
@@ -179,8 +170,17 @@ void describe_parameters(const JointProblem& joint, const ParameterUncertainty& 
     }
     result.parameters.push_back(fitted);
   }
-  for (std::size_t r = 0; r < joint.runs().size(); ++r) add_steady_load(joint, r, uncertainty.coloured, covariance, result);
-  result.correlation = correlation_of(covariance);
+  std::vector<Index> described(static_cast<std::size_t>(all));
+  std::iota(described.begin(), described.end(), Index{0});
+  for (Index r = 0; r < static_cast<Index>(joint.runs().size()); ++r) {
+    const RunResidual& run = joint.runs()[static_cast<std::size_t>(r)];
+    const double unit_reading = reading_of_steady_load(run);
+    if (unit_reading == 0) continue;
+    const Index offset = static_cast<Index>(uncertainty.free.size()) + r;
+    result.parameters.push_back(steady_load(run, joint.theta(static_cast<std::size_t>(r)), unit_reading, covariance(all + r, all + r), uncertainty.white_covariance(offset, offset), uncertainty.coloured_covariance(offset, offset)));
+    described.push_back(all + r);
+  }
+  result.correlation = correlation_of(covariance(described, described));
 }
 
 void describe_profiles(const JointProblem& joint, const ParameterUncertainty& uncertainty, const FitProblem& problem, FitResult& result) {

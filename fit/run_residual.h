@@ -101,6 +101,7 @@ class RunResidual {
     struct PerChannel {
       Eigen::VectorXd residual;
       Eigen::MatrixXd slope;  ///< samples x P
+      Eigen::VectorXd into_offset = {};  ///< what the noise of each sample does to the offset of the first channel, theta held
     };
     std::vector<PerChannel> channels;  ///< the fitted outputs, then the angle where the motion is estimated
   };

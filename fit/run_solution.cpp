@@ -446,29 +446,32 @@ RunResidual::Sensitivity RunResidual::sensitivity(const VectorXd& theta) const {
   const Solution solution = solve(theta);
   const Linearised& lin = *solution.model;
   const Evaluation e = differentiate(solution);
-  const auto parameters = static_cast<Index>(model_->parameters().size());
-  const Index n = run_->samples();
+  const Index parameters = static_cast<Index>(model_->parameters().size()), n = run_->samples();
+  // c follows theta; and the first offset, theta held, is (R^T R)^-1 X^T noise in its row, X what c does to the weighted readings.
+  const auto factor = e.linear_factor.triangularView<Eigen::Upper>();
+  MatrixXd moves(unknowns_, parameters + 1);
+  moves << e.linear_slope, factor.solve(factor.transpose().solve(VectorXd::Unit(unknowns_, first_offset_)));
   Sensitivity result;
-  result.channels.assign(static_cast<std::size_t>(measured_.cols()), {VectorXd::Zero(n), MatrixXd::Zero(n, parameters)});
+  result.channels.assign(static_cast<std::size_t>(measured_.cols()), {VectorXd::Zero(n), MatrixXd::Zero(n, parameters + 1)});
   follow_partials(theta, solution.linear, {}, [&](std::size_t block, const Interval& s, const MatrixXd& m) {
     Sensitivity::PerChannel& channel = result.channels[block % result.channels.size()];
     channel.residual.segment(s.first, s.length()) = -m.col(parameters);
-    channel.slope.middleRows(s.first, s.length()) = m.leftCols(parameters);
+    channel.slope.block(s.first, 0, s.length(), parameters) = m.leftCols(parameters);
   });
-  for (const run_rows::Block& block : lin.blocks) add_prediction_slope(lin, block, e.linear_slope, result.channels[static_cast<std::size_t>(block.channel)].slope);  // c follows theta
+  for (const run_rows::Block& block : lin.blocks) add_prediction_slope(lin, block, moves, result.channels[static_cast<std::size_t>(block.channel)].slope);
   for (Index c = 0; c < measured_.cols(); ++c) {
     Sensitivity::PerChannel& channel = result.channels[static_cast<std::size_t>(c)];
     channel.residual = weight_.col(c).cwiseProduct(channel.residual + measured_.col(c));
     channel.slope.array().colwise() *= weight_.col(c).array();
   }
   if (angle_offset_ >= 0) {
-    Sensitivity::PerChannel angle{VectorXd(n), MatrixXd(n, parameters)};
+    Sensitivity::PerChannel angle{VectorXd(n), MatrixXd(n, parameters + 1)};
     for (const MotionBasis::Phase& phase : phases_) {
       const Interval& s = phase.samples;
       const MatrixXd columns = motion_.angle_columns(phase.moving ? s : Interval{s.first, s.first + 1});  // one row for a whole rest
       const VectorXd predicted = (columns * e.linear.head(motion_.unknowns())).array() + e.linear[angle_offset_];
-      MatrixXd slope = columns * e.linear_slope.topRows(motion_.unknowns());
-      slope.rowwise() += e.linear_slope.row(angle_offset_);
+      MatrixXd slope = columns * moves.topRows(motion_.unknowns());
+      slope.rowwise() += moves.row(angle_offset_);
       const Index times = phase.moving ? 1 : s.length();
       angle.residual.segment(s.first, s.length()) = predicted.replicate(times, 1);
       angle.slope.middleRows(s.first, s.length()) = slope.replicate(times, 1);
@@ -476,6 +479,10 @@ RunResidual::Sensitivity RunResidual::sensitivity(const VectorXd& theta) const {
     angle.residual = angle_weight_.cwiseProduct(angle_ - angle.residual);
     angle.slope.array().colwise() *= angle_weight_.array();
     result.channels.push_back(std::move(angle));
+  }
+  for (Sensitivity::PerChannel& channel : result.channels) {
+    channel.into_offset = channel.slope.rightCols(1);
+    channel.slope.conservativeResize(n, parameters);
   }
   return result;
 }
@@ -485,8 +492,7 @@ MatrixXd RunResidual::linear_rows(const VectorXd& theta) const {
   free.set_motion_prior({});
   const Solution solution = free.solve(theta);
   MatrixXd rows(unknowns_, unknowns_ + 1);
-  const Linearised& lin = *solution.model;
-  const MatrixXd factor = lin.eliminate->factor();
+  const MatrixXd factor = solution.model->eliminate->factor();
   rows << factor, factor * solution.linear;
   return rows;
 }

@@ -34,23 +34,44 @@ ParameterUncertainty estimate_uncertainty(const JointProblem& joint) {
   for (Index a = 0; a < count; ++a) jacobian.col(a) = lin.jacobian.col(u.free[static_cast<std::size_t>(a)]);
   const MatrixXd inverse = inverse_information(jacobian);
 
+  const auto runs = static_cast<Index>(joint.runs().size());
+  u.offset_slope = MatrixXd::Zero(runs, static_cast<Index>(joint.unknowns().size()));
+  for (Index r = 0; r < runs; ++r) {
+    const RunResidual& run = joint.runs()[static_cast<std::size_t>(r)];
+    const Eigen::RowVectorXd slope = run.evaluate(joint.theta(static_cast<std::size_t>(r)), Partials::all).linear_slope.row(run.first_offset());
+    for (std::size_t i = 0; i < joint.unknowns().size(); ++i)
+      if (const Unknown& known = joint.unknowns()[i]; known.run < 0 || known.run == static_cast<int>(r)) u.offset_slope(r, static_cast<Index>(i)) = slope[known.parameter];
+  }
+  MatrixXd by_theta(count + runs, count);  // what the unknowns do to themselves and to the offsets
+  by_theta << MatrixXd::Identity(count, count), u.offset_slope(Eigen::all, u.free);
+
   constexpr double significant = 0.01;
   double freedom = -static_cast<double>(count);
   ColouredCovariance coloured;
-  for (std::size_t r = 0; r < joint.runs().size(); ++r) {
-    const RunResidual::Sensitivity sensitivity = joint.runs()[r].sensitivity(joint.theta(r));
-    u.whiteness.push_back(whiteness(sensitivity));
-    u.coloured |= u.whiteness.back() * static_cast<double>(joint.runs().size()) < significant;
-    freedom += static_cast<double>(joint.runs()[r].degrees_of_freedom());
-    const Index parameters = joint.theta(r).size();
-    MatrixXd influence = MatrixXd::Zero(count, parameters), own = MatrixXd::Zero(parameters, parameters);
+  u.white_covariance = by_theta * inverse * by_theta.transpose();
+  for (Index r = 0; r < runs; ++r) {
+    const RunResidual& run = joint.runs()[static_cast<std::size_t>(r)];
+    const VectorXd theta = joint.theta(static_cast<std::size_t>(r));
+    const RunResidual::Sensitivity sensitivity = run.sensitivity(theta);
+    std::vector<VectorXd> residuals;
+    for (const auto& channel : sensitivity.channels) {
+      residuals.push_back(residual_at_rest(channel.residual, run.motion().phases(), run.linear_unknowns()));
+      u.white_covariance(count + r, count + r) += channel.into_offset.squaredNorm();
+    }
+    u.whiteness.push_back(whiteness(residuals));
+    u.coloured |= u.whiteness.back() * static_cast<double>(runs) < significant;
+    freedom += static_cast<double>(run.degrees_of_freedom());
+    const Index parameters = theta.size();
+    const auto acts = [&](Index b) { return unknown(b).run < 0 || unknown(b).run == static_cast<int>(r); };
+    MatrixXd influence = MatrixXd::Zero(count + runs, parameters), own = MatrixXd::Zero(parameters, parameters);
+    const MatrixXd estimates = by_theta * inverse;
     for (Index b = 0; b < count; ++b)
-      if (unknown(b).run < 0 || unknown(b).run == static_cast<int>(r)) influence.col(unknown(b).parameter) += inverse.col(b);
+      if (acts(b)) influence.col(unknown(b).parameter) += estimates.col(b);
     for (Index a = 0; a < count; ++a)
-      if (unknown(a).run < 0 || unknown(a).run == static_cast<int>(r)) own.row(unknown(a).parameter) += influence.row(a);
-    coloured.add(coloured_covariance(sensitivity, influence, own));
+      if (acts(a)) own.row(unknown(a).parameter) += influence.row(a);
+    coloured.add(coloured_covariance(sensitivity, residuals, influence, count + r, own));
   }
-  u.white_covariance = inverse * std::max(1.0, lin.chi2() / freedom);
+  u.white_covariance *= std::max(1.0, lin.chi2() / freedom);
   u.coloured_covariance = coloured.with_its_own_error();
   return u;
 }

@@ -102,9 +102,7 @@ Mismatch locate_mismatch(const JointProblem& joint) {
       m.energy = left.squaredNorm() / count;
       const double freedom = count - static_cast<double>(run.linear_unknowns());
       const double energy_p = upper_normal((left.squaredNorm() - freedom) / std::sqrt(2 * freedom) / beyond_motion - (beyond_motion - 1) * std::sqrt(freedom / 2));
-      RunResidual::Sensitivity one;
-      one.channels.push_back({left, {}});
-      m.p_value = std::min(1.0, 2 * std::min(energy_p, whiteness(one)));
+      m.p_value = std::min(1.0, 2 * std::min(energy_p, whiteness({left})));
       m.excess = std::max(0.0, left.squaredNorm() - freedom);
       mismatch.channels.push_back(m);
       residuals.push_back(std::move(left));
