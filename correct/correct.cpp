@@ -243,6 +243,7 @@ CorrectResult correct(const CorrectProblem& problem) {
   if (windows.front().stride > farthest_knots) result.warnings.push_back(knots_too_far_apart(run, windows.front().stride));
 
   RunResidual residual(model, run, windows);
+  residual.follow_in(problem.fit.law_steps);
   MatrixXd rough;
   const Search free = estimate(residual, prior, start, rough);
   const Search best = problem.imposed.any() ? constrained(residual, free, problem.imposed, response_semichords(length)) : free;

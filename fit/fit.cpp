@@ -105,6 +105,7 @@ FitResult describe_fit(Arrival& arrival, const FitProblem& problem, Settle first
   result.message = arrival.message;
 
   const JointProblem& joint = arrival.joint;
+  result.law_steps = joint.runs().front().finer();
   const JointProblem::Linearisation lin = joint.linearise();
   result.chi2 = lin.chi2();
   for (const Unknown& u : joint.unknowns()) result.variables += u.held ? 0 : 1;

@@ -83,6 +83,7 @@ struct FitResult {
   std::vector<FittedRun> runs;
   bool coloured = false;        ///< which of the two standard errors `std_error` is
   std::vector<std::string> effects;
+  Eigen::Index law_steps = 1;   ///< nonlinear laws were followed in so many times the steps that they ask for
   std::string rig_file;
   Wagner circulation = Wagner::within_1e4;
   Eigen::Index normal_modes = 0, torsion_modes = 0;

@@ -48,6 +48,7 @@ std::string to_json(const FitResult& r) {
   out["modes"] = {{"normal", r.normal_modes}, {"torsion", r.torsion_modes}};
   out["standard_errors"] = r.coloured ? "from the residuals' own spectra (coloured)" : "white residuals, times sqrt(reduced chi-square) where that exceeds one";
   if (!r.effects.empty()) out["effects"] = r.effects;
+  if (r.law_steps > 1) out["law_steps"] = r.law_steps;
   out["parameters"] = json::array();
   for (const FittedParameter& p : r.parameters) {
     json item = {{"name", p.name},   {"value", number(p.value)}, {"std_error", number(p.std_error)},
@@ -120,6 +121,8 @@ FittedRig read_fit(const json& in, const std::string& path) {
     }
     fit.effects = in.value("effects", std::vector<std::string>{});
     for (const std::string& id : fit.effects) effect(id);  // refuses what this version does not know
+    fit.law_steps = in.value("law_steps", Eigen::Index{1});
+    if (fit.law_steps < 1) throw refuse(fmt::format("\"law_steps\" of {}", fit.law_steps));
     for (const json& item : in.at("parameters")) {
       FittedParameter p;
       p.name = item.at("name").get<std::string>();

@@ -14,6 +14,7 @@ struct FittedRig {
   Wagner circulation = Wagner::within_1e4;
   Eigen::Index normal_modes = 0, torsion_modes = 0;
   std::vector<std::string> effects;  ///< at work in the fitted model
+  Eigen::Index law_steps = 1;        ///< FitResult::law_steps
   std::vector<FittedParameter> parameters;
   Eigen::MatrixXd correlation;
   std::vector<std::string> runs;

@@ -1,0 +1,40 @@
+#include "fit/fit_files.h"
+
+#include <gtest/gtest.h>
+
+#include <nlohmann/json.hpp>
+
+#include "core/error.h"
+#include "tests/support/temporary_directory.h"
+
+namespace unrig {
+namespace {
+
+using nlohmann::json;
+
+/// A fit with one parameter and an effect, as it stands in its file.
+json written(Eigen::Index law_steps) {
+  FitResult result;
+  result.effects = {"cubic-stiffness"};
+  result.law_steps = law_steps;
+  result.parameters = {{"cubic-stiffness.coefficient", "1/m^2", "", 40, 1, 1, 1, 0, true, ""}};
+  result.correlation = Eigen::MatrixXd::Identity(1, 1);
+  return json::parse(to_json(result));
+}
+
+FittedRig read_back(const json& fit) {
+  const test::TemporaryDirectory directory;
+  return read_fit(directory.file("fit.json", fit.dump()));
+}
+
+TEST(FitFiles, CarryTheStepsInWhichLawsWereFollowed) {
+  EXPECT_EQ(read_back(written(4)).law_steps, 4);
+  EXPECT_FALSE(written(1).contains("law_steps")) << "what every fit without strong laws does";
+  EXPECT_EQ(read_back(written(1)).law_steps, 1);
+  json wrong = written(4);
+  wrong["law_steps"] = 0;
+  EXPECT_THROW(read_back(wrong), InputError);
+}
+
+}  // namespace
+}  // namespace unrig
