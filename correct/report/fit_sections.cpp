@@ -103,7 +103,7 @@ void add_traces(ReportPage& page, const Run& run, std::vector<FitTrace> traces) 
     page.add_plot({trace.name + ": recording and fit", "time [s]", labelled(trace.name, trace.unit), time, {{"recording", 0, trace.measured}, {"fit", 2, trace.model, {}, true}}, run.file});
     page.add_plot({trace.name + ": residual", "time [s]", labelled("recording − fit", trace.unit), time,
                    {{"residual", 1, left}, {"noise", 0, VectorXd::Zero(time.size()), VectorXd::Constant(time.size(), trace.noise), true}}, run.file,
-                   fmt::format("The band is the channel's own noise, {:.3g} {}.", trace.noise, trace.unit), false, false, 180});
+                   fmt::format("The band is the channel's own noise, {:.3g} {}.", trace.noise, trace.unit), false, false, 180, {}, trace.measured});
   }
   const FitTrace& first = traces.front();
   add_spectra(page, first.name + ": spectra before and after", run.dt, first.unit, {"recording", 0, first.measured}, {"residual", 1, first.measured - first.model},

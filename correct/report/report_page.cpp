@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstdlib>
 #include <stdexcept>
+#include <utility>
 
 #include <fmt/format.h>
 
@@ -33,7 +34,7 @@ json numbers(const std::vector<double>& values) {
   return out;
 }
 
-/// Rows [first, last) of a plot: where its curves are lowest and highest, and how much the one that varies most does so on the plot's axis.
+/// Rows [first, last) of a plot: where its curves are lowest and highest, and how much the one that varies most does so on the plot's axis, or `busy`.
 struct Stretch {
   Index first, last;
   std::vector<Index> extremes;
@@ -41,21 +42,29 @@ struct Stretch {
   bool operator<(const Stretch& other) const { return varies < other.varies; }
 };
 
+/// The smallest and the largest number in rows [first, last) that can be drawn; -1 where there is none.
+std::pair<Index, Index> extremes_of(const Eigen::VectorXd& value, bool log, Index first, Index last) {
+  Index low = -1, high = -1;
+  for (Index k = first; k < last; ++k) {
+    if (!std::isfinite(value[k]) || (log && value[k] <= 0)) continue;
+    if (low < 0 || value[k] < value[low]) low = k;
+    if (high < 0 || value[k] > value[high]) high = k;
+  }
+  return {low, high};
+}
+
 Stretch stretch_of(const Plot& plot, Index first, Index last) {
   Stretch stretch{first, last, {}};
+  const bool curves_decide = plot.busy.size() == 0;
   for (const Curve& curve : plot.curves) {
-    Index low = -1, high = -1;
-    for (Index k = first; k < last; ++k) {
-      const double v = curve.value[k];
-      if (!std::isfinite(v) || (plot.log_y && v <= 0)) continue;
-      if (low < 0 || v < curve.value[low]) low = k;
-      if (high < 0 || v > curve.value[high]) high = k;
-    }
+    const auto [low, high] = extremes_of(curve.value, plot.log_y, first, last);
     if (low < 0) continue;
     const double l = curve.value[low], h = curve.value[high];
-    stretch.varies = std::max(stretch.varies, plot.log_y ? std::log(h / l) : h - l);
+    if (curves_decide) stretch.varies = std::max(stretch.varies, plot.log_y ? std::log(h / l) : h - l);
     stretch.extremes.insert(stretch.extremes.end(), {low, high});
   }
+  if (!curves_decide)
+    if (const auto [low, high] = extremes_of(plot.busy, false, first, last); low >= 0) stretch.varies = plot.busy[high] - plot.busy[low];
   if (stretch.extremes.empty()) stretch.extremes.push_back(first);  // a gap stays a gap
   std::sort(stretch.extremes.begin(), stretch.extremes.end());
   stretch.extremes.erase(std::unique(stretch.extremes.begin(), stretch.extremes.end()), stretch.extremes.end());
@@ -111,6 +120,7 @@ void ReportPage::add_plot(const Plot& plot) {
   for (const Curve& curve : plot.curves)
     if (curve.value.size() != plot.x.size() || (curve.std.size() > 0 && curve.std.size() != plot.x.size()))
       throw std::invalid_argument("the curve \"" + curve.name + "\" is not as long as its plot");
+  if (plot.busy.size() > 0 && plot.busy.size() != plot.x.size()) throw std::invalid_argument("what says where to look is not as long as its plot");
   const std::vector<Index> rows = kept_rows(plot, most_rows);
   std::string caption = plot.caption;
   if (static_cast<Index>(rows.size()) < plot.x.size())

@@ -31,6 +31,7 @@ struct Plot {
   bool log_x = false, log_y = false;
   int height = 260;              ///< pixels
   std::vector<std::pair<double, std::string>> marks = {};  ///< named vertical lines
+  Eigen::VectorXd busy = {};     ///< a long record keeps its detail where this varies, as long as x; empty: where its curves do
 };
 
 /// z over x and y: one row per y.

@@ -52,11 +52,16 @@ TEST(ReportPage, KeepsTheDetailOfAShortEventInALongRecord) {
     const double t = static_cast<double>(k - event), noise = 0.01 * std::sin(static_cast<double>(k * k));
     y[k] = noise + (t >= 0 && t < 200 ? std::sin(0.3 * t) : 0);
   }
-  const std::vector<Index> rows = kept_rows({"", "time [s]", "gauge [N]", VectorXd::LinSpaced(samples, 0, 1), {{"gauge", 0, y}}}, 6000);
-  EXPECT_LE(rows.size(), 6000u);
-  const auto kept_in = [&](Index first, Index last) { return std::lower_bound(rows.begin(), rows.end(), last) - std::lower_bound(rows.begin(), rows.end(), first); };
-  EXPECT_GT(kept_in(event, event + 200), 150);
-  for (Index first = 0; first < samples; first += samples / 1000) EXPECT_GE(kept_in(first, first + 2 * samples / 1000), 1) << "no stretch is forgotten";
+  const VectorXd x = VectorXd::LinSpaced(samples, 0, 1);
+  Plot own{"", "time [s]", "gauge [N]", x, {{"gauge", 0, y}}}, residual{"", "time [s]", "gauge [N]", x, {{"residual", 0, x}}};
+  residual.busy = y;  // a plot beside it has its detail in the same places
+  for (const Plot& plot : {own, residual}) {
+    const std::vector<Index> rows = kept_rows(plot, 6000);
+    EXPECT_LE(rows.size(), 6000u);
+    const auto kept_in = [&](Index first, Index last) { return std::lower_bound(rows.begin(), rows.end(), last) - std::lower_bound(rows.begin(), rows.end(), first); };
+    EXPECT_GT(kept_in(event, event + 200), 150);
+    for (Index first = 0; first < samples; first += samples / 1000) EXPECT_GE(kept_in(first, first + 2 * samples / 1000), 1) << "no stretch is forgotten";
+  }
 }
 
 TEST(ReportPage, KeepsShortRecordsAsTheyAre) {
@@ -90,6 +95,9 @@ TEST(ReportPage, RefusesCurvesOfOtherLength) {
   ReportPage page("");
   EXPECT_THROW(page.add_plot({"", "x", "y", VectorXd::Zero(3), {{"a", 0, VectorXd::Zero(2)}}}), std::invalid_argument);
   EXPECT_THROW(page.add_plot({"", "x", "y", VectorXd::Zero(3), {{"a", 0, VectorXd::Zero(3), VectorXd::Zero(4)}}}), std::invalid_argument);
+  Plot plot{"", "x", "y", VectorXd::Zero(3), {{"a", 0, VectorXd::Zero(3)}}};
+  plot.busy = VectorXd::Zero(2);
+  EXPECT_THROW(page.add_plot(plot), std::invalid_argument);
 }
 
 }  // namespace
