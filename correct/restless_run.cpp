@@ -160,6 +160,8 @@ void RestlessRun::slopes(const Point& point, const VectorXcd& motion, const std:
     for (std::size_t j = first; j < last; ++j) {
       MatrixXd& kernel = response.partial[static_cast<std::size_t>(parameters[j])];
       if (kernel.size() == 0) kernel = MatrixXd::Zero(samples(), system.C.rows());
+      if (!kernel.allFinite())
+        throw NoAnswer(fmt::format("{}: over so long a record ({} samples) the model's response to the shaft does not stay finite where the search has come to; correct the run in shorter parts", run_->file, samples()));
       for (Index c = 0; c < kernel.cols(); ++c)
         if (!kernel.col(c).isZero(0)) kernel.col(c) = convolution_.past(convolution_.transform(kernel.col(c)), motion);
       take(static_cast<Index>(j), kernel);

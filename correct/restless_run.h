@@ -34,7 +34,7 @@ class RestlessRun {
   RestlessRun(const AeroelasticModel& model, const Run& run);
 
   RunResidual::Solution solve(const Eigen::VectorXd& theta) const;
-  /// Derivatives with respect to `parameters`; the other columns are zero. `linear`: offsets, angle before the motion, signals of effects.
+  /// Derivatives with respect to `parameters`; the other columns are zero. `linear`: offsets, angle before the motion, signals of effects. Throws NoAnswer where the model does not stay finite.
   RunResidual::Evaluation differentiate(const RunResidual::Solution& solution, const std::vector<Eigen::Index>& parameters) const;
 
   /// Noise of each channel from what the model at theta leaves of it, where that is less; angle samples that stand alone are left out, missing ones filled.
