@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <set>
 
 #include "core/effects/effect.h"
 #include "core/error.h"
@@ -98,12 +99,15 @@ std::vector<MissingEffect> effects_of(const Trial& best, const Diagnosis& d) {
   return set;
 }
 
-/// The sets of `tried` that are as good as the best.
+/// The sets of `tried` that are as good as the best, each once, in whatever order its effects were found.
 void name_equivalent(const Trial& baseline, const Trial& best, const std::vector<Trial>& tried, bool verdict_only, Diagnosis& d) {
   const double best_bic = bic_difference(best, baseline);
+  const auto set_of = [](const Trial& t) { return std::set<std::string>(t.effects.begin(), t.effects.end()); };
+  std::set<std::set<std::string>> named{set_of(best)};
   for (const Trial& t : tried) {
-    const bool other = t.effects != best.effects && t.effects.size() <= best.effects.size();
+    const bool other = t.effects.size() <= best.effects.size() && !named.contains(set_of(t));
     if (!other || bic_difference(t, baseline) - best_bic >= decisive) continue;
+    named.insert(set_of(t));
     d.equivalent.push_back(t.effects);
     d.separated_by.push_back(verdict_only ? std::nullopt : separating_recording(best.arrival, t.arrival));
   }

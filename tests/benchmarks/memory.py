@@ -4,7 +4,8 @@
   python3 tests/benchmarks/memory.py build/unrig [samples ...]
 
 Made for it: a pitch step and the rest behind it, a free decay, a sine of 1.5 Hz without a rest, and twenty steps with rests between, 2 ms a sample, of the rig of
-sample_data/campaigns/null, with its noise (0.03 N, 0.01 degrees). Peak: the largest resident set of the process (getrusage). Without samples: 100 000 and 1 000 000.
+sample_data/campaigns/null, with its noise (0.03 N, 0.01 degrees). Peak: the largest resident set of the process (getrusage). Without samples: 100 000 and 1 000 000. The last two
+only up to 100 000.
 """
 import math
 import os
