@@ -22,7 +22,7 @@ enum : Index { normal_scale, torsion_scale, apparent_mass };
 
 constexpr double scan_tolerance = 0.04;   // of a frequency
 constexpr double match_tolerance = 0.03;
-constexpr double prior_width = 0.5;       // of ln(k_t / k_n)
+constexpr double ratio_width = 0.5;       // of ln(k_t / k_n)
 constexpr double strong = 0.1;            // of the strongest vibration
 
 MatrixXd stiffness_of(const UndampedSystem& s, const RigScales& scales) {
@@ -140,7 +140,7 @@ class FrequencyCost : public ceres::CostFunction {
         add((f.hertz - model.hertz[*f.mode]) / error, -model.slope.row(*f.mode).cwiseProduct(scales.transpose()) / error);
       }
     }
-    add((values[0][torsion_scale] - values[0][normal_scale]) / prior_width, Eigen::RowVector3d(-1, 1, 0) / prior_width);
+    add((values[0][torsion_scale] - values[0][normal_scale]) / ratio_width, Eigen::RowVector3d(-1, 1, 0) / ratio_width);
     return true;
   }
 
@@ -262,7 +262,7 @@ std::optional<FrequencyFit> fit_rig_frequencies(ObservedRun& dry, ObservedRun& w
   }
   fit.scales = solution.scales;
   fit.covariance = fit.scales.asDiagonal() * solution.covariance * fit.scales.asDiagonal();
-  fit.torsion_identified = std::sqrt(solution.covariance(torsion_scale, torsion_scale)) < prior_width / 2;
+  fit.torsion_identified = std::sqrt(solution.covariance(torsion_scale, torsion_scale)) < ratio_width / 2;
   return fit;
 }
 

@@ -7,7 +7,7 @@ namespace unrig {
 
 namespace {
 
-constexpr double rounding = 0.1;  // of a corner, as a share of the gap, for searches to follow its slopes
+constexpr double rounding = 0.03;  // of a corner, as a share of the gap, for searches to follow its slopes
 constexpr Eigen::Index steps = 8;  // within a sample, in which the section may cross the whole gap
 
 /// What the gap takes from the deflection: z within it, the gap beyond.
@@ -34,7 +34,7 @@ double rounded_gap(double z, const double* p, double& slope, double* partial) {
 }  // namespace
 
 /// A gap in the torsional drive: the elastic couple acts on the twist beyond the gap only, M = -k (theta - clamp(theta, -delta, delta)), theta the elastic twist [rad] of
-/// the section in the first torsional mode, delta half the gap [rad], k that mode's stiffness; a fit rounds the corners from 0.9 to 1.1 delta. The gap is centred where
+/// the section in the first torsional mode, delta half the gap [rad], k that mode's stiffness; a fit rounds the corners from 0.97 to 1.03 delta. The gap is centred where
 /// the rig stood before the run.
 /// Source: E. H. Dowell et al., A Modern Course in Aeroelasticity (2015), chapter 11.
 Effect freeplay() {
