@@ -25,6 +25,8 @@ double independent_share(const VectorXd& left) {
   return mean > 0 ? std::min(1.0, 2 * mean * mean / power.cwiseAbs2().mean()) : 1;  // the lines of white noise are exponentially distributed
 }
 
+constexpr double run_away = 1e30;  // variance of a run whose model does not stay finite: infinite, but two of them can be compared
+
 /// What the present fit leaves of a run.
 struct LeftOfRun {
   double variance = 0;     // residual power over noise power
@@ -51,6 +53,11 @@ std::vector<LeftOfRun> left_of_runs(const JointProblem& joint) {
   in_parallel(all.size(), [&](std::size_t r) {
     const RunResidual& run = joint.runs()[r];
     const RunResidual::Prediction p = run.predict(joint.theta(r));
+    if (!p.output.allFinite()) {
+      const auto samples = static_cast<double>(run.run().samples());
+      all[r] = {run_away, samples, samples};
+      return;
+    }
     double power = 0;
     for (std::size_t c = 0; c < p.channels.size(); ++c) {
       const VectorXd left = standardised_residual(run, p, c);
@@ -84,6 +91,7 @@ bool temper(JointProblem& joint) {
   bool changed = false;
   const std::vector<LeftOfRun> left = left_of_runs(joint);
   for (std::size_t r = 0; r < left.size(); ++r) {
+    if (!(left[r].variance < run_away)) continue;
     const double factor = std::sqrt(std::max(1.0, left[r].variance)), now = factor < 1.1 ? 1.0 : factor;
     changed = changed || std::abs(std::log(now / joint.runs()[r].tempered())) > 0.1;
     joint.runs()[r].temper(now);

@@ -70,6 +70,7 @@ VectorXd RunResidual::largest_arguments(const VectorXd& theta) const {
   const Solution solution = solve(theta);
   const Linearised& lin = *solution.model;
   if (lin.system.feedback.empty()) return {};
+  if (!std::isfinite(lin.chi2)) return VectorXd::Zero(static_cast<Index>(lin.system.feedback.size()));
   const NonlinearDrive from{initial_state(lin.linear, lin.system.states()), whole_jerk(lin.linear), inputs_, MatrixXd(lin.system.states(), 0), {}};
   return follow(lin.system, lin.step, theta, from, last_sample_, Partials::none).largest_argument;
 }

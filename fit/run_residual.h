@@ -43,7 +43,7 @@ class RunResidual {
   RunResidual(const AeroelasticModel& model, const Run& run, std::vector<MotionBasis::Window> motion, RunOptions options = {});
 
   /// At theta: P + 1 numbers whose squares sum to the least chi-square, and their derivative. Kaufman's Jacobian: its gradient is that of
-  /// chi-square exactly, and J^T J is the Gauss-Newton Hessian with c eliminated.
+  /// chi-square exactly, and J^T J is the Gauss-Newton Hessian with c eliminated. Infinite, with zero derivatives, where the model runs away from every c that was tried.
   struct Evaluation {
     double chi2 = 0;
     Eigen::VectorXd residual;  ///< P + 1
@@ -74,7 +74,8 @@ class RunResidual {
   };
   SideBySide side_by_side(const Eigen::VectorXd& theta, const Eigen::VectorXd& linear, Eigen::Index samples, Partials partials) const;
 
-  /// The fitted channels over the whole record, at theta and the c that belongs to it.
+  /// The fitted channels over the whole record, at theta and the c that belongs to it. Where the model runs away from every c that was tried, `output` is not a
+  /// number, the motion is the angle's own, and `linear_factor` zero.
   struct Prediction {
     std::vector<std::string> channels;
     Eigen::MatrixXd output;        ///< samples x channels, offsets included
@@ -87,7 +88,7 @@ class RunResidual {
   };
   Prediction predict(const Eigen::VectorXd& theta) const;
 
-  /// The largest argument that the law of each nonlinear effect sees at theta; empty for a linear model.
+  /// The largest argument that the law of each nonlinear effect sees at theta; empty for a linear model, zero where the model runs away.
   Eigen::VectorXd largest_arguments(const Eigen::VectorXd& theta) const;
 
   /// Parameters with respect to which `evaluate` differentiates; the other columns of the Jacobian are zero, and cost nothing. Empty: all.

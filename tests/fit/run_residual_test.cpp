@@ -145,6 +145,24 @@ TEST(RunResidual, DifferentiatesOnlyWhatIsAsked) {
     for (const Index b : {0, 4}) EXPECT_NEAR(few.jacobian.col(a).dot(few.jacobian.col(b)) / (all.col(a).norm() * all.col(b).norm()), all.col(a).dot(all.col(b)) / (all.col(a).norm() * all.col(b).norm()), 1e-8);
 }
 
+TEST(RunResidual, AModelThatRunsAwayIsInfiniteAndSaysNothing) {
+  const Rig rig = read_rig(test::null_campaign("rig.toml"));
+  const AeroelasticModel model = AeroelasticModel(rig, make_basis(rig, Index{2}, Index{1}), wagner(Wagner::jones)).with_effects({"cubic-stiffness"});
+  VectorXd theta = model.start_values();
+  theta[model.index("cubic-stiffness.coefficient")] = std::nan("");
+  for (const char* file : {"wet_pluck.csv", "step_a.csv"}) {
+    const unrig::Run run = read_run(test::null_campaign(file));
+    const RunResidual residual(model, run, {});
+    EXPECT_TRUE(std::isinf(residual.solve(theta).chi2)) << file;
+    const RunResidual::Evaluation e = residual.evaluate(theta, Partials::all);
+    EXPECT_TRUE(std::isinf(e.chi2) && !e.residual.allFinite() && e.jacobian.isZero()) << file;
+    const RunResidual::Prediction p = residual.predict(theta);
+    EXPECT_TRUE(p.output.array().isNaN().all()) << file;
+    EXPECT_EQ(p.motion.angle.size(), residual.motion().unknowns() > 0 ? run.samples() : 0) << file;
+    EXPECT_EQ(residual.largest_arguments(theta).size(), 1) << "it is no linear model: " << file;
+  }
+}
+
 TEST(RunResidual, PriorRowsCountInChiSquare) {
   const Case c = step(1);
   RunResidual residual = c.residual();
