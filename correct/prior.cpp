@@ -174,7 +174,7 @@ Search minimise(const Searched& run, Prior prior, const VectorXd& theta, double 
     double fraction = 1;
     for (int halving = 0; halving < most_halvings && !moved; ++halving, fraction /= 2) {
       RunResidual::Solution next = run.solve(run.advance ? run.advance(at, fraction * move) : at + fraction * move);
-      moved = !allowed || cost(next.chi2, search.prior, next.theta) < now;
+      moved = std::isfinite(next.chi2) && (!allowed || cost(next.chi2, search.prior, next.theta) < now);
       if (moved) search.solution = std::move(next);
     }
     if (!moved) break;

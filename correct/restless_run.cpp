@@ -1,5 +1,6 @@
 #include "correct/restless_run.h"
 
+#include <Eigen/Eigenvalues>
 #include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
@@ -129,7 +130,19 @@ const RestlessRun::Point& RestlessRun::at(const VectorXd& theta) const {
   return *last_;
 }
 
+double RestlessRun::growth(const VectorXd& theta) const {
+  const LinearSystem system = loaded_system(*model_, conditions_, theta, channels_);
+  std::vector<Index> own;  // the shaft's position, velocity and acceleration are driven from outside
+  for (const Index i : kept_)
+    if (i < motion_state_ || i > motion_state_ + 2) own.push_back(i);
+  if (!system.A.value.allFinite()) return INFINITY;
+  return MatrixXd(system.A.value(own, own)).eigenvalues().real().maxCoeff() * run_->dt * static_cast<double>(samples());
+}
+
 RunResidual::Solution RestlessRun::solve(const VectorXd& theta) const {
+  // The filter forgets how a motion grows, but the responses that the slopes are made of run over the whole record.
+  constexpr double flutter = 1;
+  if (!(growth(theta) < flutter)) return {theta, INFINITY, {}, nullptr};
   const Point& point = at(theta);
   return {theta, point.chi2, point.linear, nullptr};
 }

@@ -33,6 +33,7 @@ class RestlessRun {
  public:
   RestlessRun(const AeroelasticModel& model, const Run& run);
 
+  /// chi-square infinite where the rig would flutter or diverge within the record.
   RunResidual::Solution solve(const Eigen::VectorXd& theta) const;
   /// Derivatives with respect to `parameters`; the other columns are zero. `linear`: offsets, angle before the motion, signals of effects. Throws NoAnswer where the model does not stay finite.
   RunResidual::Evaluation differentiate(const RunResidual::Solution& solution, const std::vector<Eigen::Index>& parameters) const;
@@ -55,6 +56,8 @@ class RestlessRun {
     double chi2 = 0, log_determinant = 0;
   };
   const Point& at(const Eigen::VectorXd& theta) const;
+  /// By how many powers of e the rig's least stable motion in the stream grows over the record; negative where all decay.
+  double growth(const Eigen::VectorXd& theta) const;
   /// Rows over the filter's states, at the sample where they stand.
   Eigen::RowVectorXd row(const Eigen::RowVectorXd& over_model_states) const;
   /// Spline coefficients of the motion as deviation from the first, for convolution with spline responses.

@@ -102,6 +102,17 @@ TEST(RestlessRun, SlopesOfChiSquareAreItsDifferences) {
 }
 
 /// The settled filter is for linear rigs, and 400 knots do not follow such a motion: it must say so, and what to do.
+// Where the section moves with negative damping no record like this one exists; the responses that slopes are made of would overflow over a long one.
+TEST(RestlessRun, ARigThatWouldFlutterIsNoCandidate) {
+  const Recorded r = record(many_frequencies, 2000);
+  const AeroelasticModel model(test::null_rig(), make_basis(test::null_rig(), test::null_fit().normal_modes, test::null_fit().torsion_modes), wagner(Wagner::jones));
+  const RestlessRun run(model, r.run);
+  VectorXd theta = theta_for(model, test::null_fit(), "");
+  EXPECT_TRUE(std::isfinite(run.solve(theta).chi2));
+  theta[model.index("torsion.damping_ratio")] = -0.5;
+  EXPECT_TRUE(std::isinf(run.solve(theta).chi2));
+}
+
 TEST(Restless, ANonlinearForceIsRefusedWithAdvice) {
   const Recorded r = record(&sine, 10000);
   FittedRig fit = test::null_fit();
