@@ -194,29 +194,38 @@ void describe_run(const CorrectProblem& problem, CorrectResult& result) {
   result.warnings = run.warnings;
 }
 
-/// Knots of the motion this far apart still hold the bands in tests/studies/CORRECT.md; the acceleration of an oscillation is off by (omega h)^2 / 12.
-constexpr Index farthest_knots = 8;  // samples
+/// Knots of one long motion this far apart still hold the bands in tests/studies/CORRECT.md; the acceleration of an oscillation is off by (omega h)^2 / 12. A shaft that moves and rests by turns
+/// moves fast: a step within 20 samples with a knot on every seventh is off by tens of standard deviations.
+Index farthest_knots(const std::vector<MotionBasis::Window>& windows) { return windows.size() > 1 ? 1 : 8; }  // samples
 
-/// Whether the shaft moves for so long that the fit's knots, at most 400, lie too far apart, and for most of the record.
+bool too_far_apart(const std::vector<MotionBasis::Window>& windows) { return windows.front().stride > farthest_knots(windows); }
+
 bool hardly_rests(const Run& run, const std::vector<MotionBasis::Window>& windows) {
   constexpr double most = 0.5;
   Index moving = 0;
   for (const MotionBasis::Window& w : windows) moving += w.knots.length();
-  return windows.front().stride > farthest_knots && static_cast<double>(moving) > most * static_cast<double>(run.samples());
+  return static_cast<double>(moving) > most * static_cast<double>(run.samples());
 }
 
-/// The settled filter is for linear rigs.
-void check_linear(const AeroelasticModel& model, const Run& run, const VectorXd& theta) {
-  if (model.system(conditions_of(run), theta, model.output_channels(run)).feedback.empty()) return;
-  throw NoAnswer(fmt::format("{}: the shaft moves nearly all the time, for longer than {} samples, and the fit names a nonlinear force. Such a motion is followed by 400 knots, which lie too far apart here: "
-                             "correct the run in parts of at most {} samples that begin at rest",
-                             run.file, farthest_knots * 400, farthest_knots * 400));
+Index most_moving(const std::vector<MotionBasis::Window>& windows) { return farthest_knots(windows) * most_knots(windows.size()); }
+
+std::string knots_too_far_apart(const Run& run, const std::vector<MotionBasis::Window>& windows) {
+  const Index stride = windows.front().stride;
+  return fmt::format("{}: the fit names a nonlinear force, and the shaft moves for so long in all that the {} knots of its motion lie {} samples apart ({:.3g} ms). What it does faster is missing from the load, and the "
+                     "band is too narrow while it moves. Correct the run in parts in which it moves for at most {} samples.",
+                     run.file, most_knots(windows.size()), stride, 1e3 * static_cast<double>(stride) * run.dt, most_moving(windows));
 }
 
-std::string knots_too_far_apart(const Run& run, Index stride) {
-  return fmt::format("{}: the shaft moves for so long in all that the 400 knots of its motion lie {} samples apart ({:.3g} ms). What it does faster is missing from the load, and the band is too narrow while it "
-                     "moves. Correct the run in parts in which it moves for at most {} samples.",
-                     run.file, stride, 1e3 * static_cast<double>(stride) * run.dt, farthest_knots * 400);
+/// The settled filter is for linear rigs: a nonlinear force has to do with the knots there are, and is told so.
+bool goes_from_sample_to_sample(const AeroelasticModel& model, const Run& run, const VectorXd& theta, const std::vector<MotionBasis::Window>& windows, std::vector<std::string>& warnings) {
+  if (!too_far_apart(windows)) return false;
+  if (model.system(conditions_of(run), theta, model.output_channels(run)).feedback.empty()) return true;
+  if (hardly_rests(run, windows))
+    throw NoAnswer(fmt::format("{}: the shaft moves nearly all the time, for longer than {} samples, and the fit names a nonlinear force. Such a motion is followed by {} knots, which lie too far apart here: "
+                               "correct the run in parts of at most {} samples that begin at rest",
+                               run.file, most_moving(windows), most_knots(windows.size()), most_moving(windows)));
+  warnings.push_back(knots_too_far_apart(run, windows));
+  return false;
 }
 
 }  // namespace
@@ -235,12 +244,10 @@ CorrectResult correct(const CorrectProblem& problem) {
   const AeroelasticModel model = free_model(problem, length);
   const VectorXd start = theta_for(model, problem.fit, run.file);
   const Prior prior = prior_of(model, problem.fit, start, run.file);
-  if (hardly_rests(run, windows)) {
-    check_linear(model, run, start);
+  if (goes_from_sample_to_sample(model, run, start, windows, result.warnings)) {
     correct_restless({model, run, prior, start, length, steady_per_reading(problem.rig), problem.imposed}, result);
     return result;
   }
-  if (windows.front().stride > farthest_knots) result.warnings.push_back(knots_too_far_apart(run, windows.front().stride));
 
   RunResidual residual(model, run, windows);
   residual.follow_in(problem.fit.law_steps);

@@ -76,12 +76,13 @@ std::vector<Interval> moving_softly(const VectorXd& angle, double sigma) {
 
 }  // namespace
 
+Eigen::Index most_knots(std::size_t windows) { return windows > 1 ? 600 : 400; }
+
 std::vector<MotionBasis::Window> motion_windows(const Run& run) {
   const Channel* alpha = run.find("alpha");
   if (!alpha || run.kind != RunKind::step) return {};
   const double sigma = noise_level(alpha->value);
   std::vector<MotionBasis::Window> windows;
-  constexpr Index most_knots = 400;  // a motion that goes on and on gets coarser knots
   for (const Interval& i : moving_softly(alpha->value, sigma)) {
     // The load goes with the second derivative: it starts before the angle visibly does, and the drive rings after it has arrived, no longer for having moved for long.
     const Index before = std::clamp<Index>(i.length() / 2, 8, 100), after = std::clamp<Index>(2 * i.length(), 60, 300);
@@ -93,7 +94,7 @@ std::vector<MotionBasis::Window> motion_windows(const Run& run) {
   }
   Index total = 0;
   for (const auto& w : windows) total += w.knots.length();
-  for (auto& w : windows) w.stride = 1 + total / (most_knots + 1);
+  for (auto& w : windows) w.stride = 1 + total / (most_knots(windows.size()) + 1);
   return windows;
 }
 

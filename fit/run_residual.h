@@ -270,6 +270,9 @@ class RunResidual {
   Eigen::Index first_state_ = 0, first_offset_ = 0, angle_offset_ = -1;
 };
 
+/// Knots of a motion in so many windows, at most; more samples make them sparser. The cost goes with their square.
+Eigen::Index most_knots(std::size_t windows);
+
 /// Windows in which the shaft of a run moves, from its angle channel, with room before and after; empty for runs without prescribed pitch.
 std::vector<MotionBasis::Window> motion_windows(const Run& run);
 

@@ -34,6 +34,13 @@ double many_frequencies(double t) {
   return 1.5 * soft((t - 0.2) / 0.3) * sum;
 }
 
+/// Ten steps of 1.3 degrees in 40 ms, up and down, with rests between.
+double ten_steps(double t) {
+  double angle = 0;
+  for (int i = 0; i < 10; ++i) angle += (i % 2 == 0 ? 1.3 : -1.3) * soft((t - 1 - 1.9 * i) / 0.04);
+  return angle;
+}
+
 struct Recorded {
   unrig::Run run;
   VectorXd circulatory, normal_force;
@@ -101,6 +108,18 @@ TEST(RestlessRun, SlopesOfChiSquareAreItsDifferences) {
   }
 }
 
+FittedRig with_friction() {
+  FittedRig fit = test::null_fit();
+  fit.effects = {"coulomb-friction"};
+  for (const char* name : {"coulomb-friction.force", "coulomb-friction.velocity"}) {
+    fit.parameters.emplace_back();
+    fit.parameters.back().name = name;
+    fit.parameters.back().value = 0.1;
+  }
+  fit.correlation = Eigen::MatrixXd::Identity(static_cast<Index>(fit.parameters.size()), static_cast<Index>(fit.parameters.size()));
+  return fit;
+}
+
 /// The settled filter is for linear rigs, and 400 knots do not follow such a motion: it must say so, and what to do.
 // Where the section moves with negative damping no record like this one exists; the responses that slopes are made of would overflow over a long one.
 TEST(RestlessRun, ARigThatWouldFlutterIsNoCandidate) {
@@ -115,16 +134,8 @@ TEST(RestlessRun, ARigThatWouldFlutterIsNoCandidate) {
 
 TEST(Restless, ANonlinearForceIsRefusedWithAdvice) {
   const Recorded r = record(&sine, 10000);
-  FittedRig fit = test::null_fit();
-  fit.effects = {"coulomb-friction"};
-  for (const char* name : {"coulomb-friction.force", "coulomb-friction.velocity"}) {
-    fit.parameters.emplace_back();
-    fit.parameters.back().name = name;
-    fit.parameters.back().value = 0.1;
-  }
-  fit.correlation = Eigen::MatrixXd::Identity(static_cast<Index>(fit.parameters.size()), static_cast<Index>(fit.parameters.size()));
   try {
-    correct({test::null_rig(), fit, r.run, 0});
+    correct({test::null_rig(), with_friction(), r.run, 0});
     FAIL() << "corrected";
   } catch (const NoAnswer& refusal) {
     EXPECT_THAT(refusal.what(), HasSubstr("nonlinear force"));
@@ -152,6 +163,25 @@ TEST(Restless, LoadIsFoundInTimeThatGoesWithTheRecord) {
     EXPECT_NEAR(result.slope, slope, 3 * result.slope_std);
     EXPECT_TRUE(result.warnings.empty()) << result.warnings.front();
   }
+}
+
+/// Six hundred knots would lie two samples apart: the load was up to 27 standard deviations off when 400 knots had to do.
+TEST(Restless, StepsThatTheKnotsCannotFollowAreFollowedFromSampleToSample) {
+  const Recorded r = record(&ten_steps, 10000);
+  const CorrectResult result = correct({test::null_rig(), test::null_fit(), r.run, 0});
+  for (const bool circulatory : {true, false}) {
+    const CorrectedLoad& load = circulatory ? result.circulatory : result.normal_force;
+    const VectorXd& truth = circulatory ? r.circulatory : r.normal_force;
+    const VectorXd off = load.value - truth, in_deviations = off.cwiseAbs().cwiseQuotient(load.std);
+    // 0.0017 and 0.006 of the range measured, the band's own width where the shaft rests.
+    EXPECT_LT(rms(off), (circulatory ? 0.0025 : 0.009) * (truth.maxCoeff() - truth.minCoeff()));
+    for (Index tenth = 0; tenth < 10; ++tenth) EXPECT_GT((in_deviations.segment(tenth * 1000, 1000).array() < 1.96).count(), 850) << tenth;
+    EXPECT_LT(in_deviations.maxCoeff(), load.simultaneous + 1);
+  }
+  EXPECT_NEAR(result.reduced_chi2, 1, 0.05);
+  EXPECT_NEAR(result.slope, slope, 3 * result.slope_std);
+  FittedRig fit = with_friction();
+  EXPECT_THAT(correct({test::null_rig(), fit, r.run, 0}).warnings, Contains(HasSubstr("600 knots of its motion lie 2 samples apart")));
 }
 
 TEST(Restless, MissingSamplesCostLittleAndAGapIsNamed) {
