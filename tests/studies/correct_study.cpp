@@ -60,6 +60,11 @@ struct Shaft {
 double smooth(double x) { return x <= 0 ? 0 : x >= 1 ? 1 : x * x * x * (10 - 15 * x + 6 * x * x); }
 double degrees(double x) { return x * std::numbers::pi / 180; }
 
+double steps_in_turn(double t) {
+  const double since = std::max(0.0, t - 1), step = std::floor(since / 1.9), risen = smooth((since - 1.9 * step) / 0.04);
+  return degrees(1.3) * (std::fmod(step, 2) == 0 ? risen : 1 - risen);
+}
+
 /// Amplitudes fall with the frequency; phases by the golden angle, so that nothing repeats.
 double arbitrary(double t) {
   constexpr double golden = 2.39996;
@@ -79,7 +84,8 @@ std::vector<Shaft> shafts() {
           {"up and down by 2 deg, five times in 2.5 s",
            [](double t) { return t < 1 || t > 3.5 ? 0.0 : degrees(1) * smooth((t - 1) / 0.1) * smooth((3.5 - t) / 0.1) * (1 - std::cos(2 * std::numbers::pi * 2 * (t - 1))); }},
           {"sinusoid of 2 deg at 1.5 Hz to the end", [](double t) { return degrees(2) * smooth((t - 1) / 0.2) * std::sin(2 * std::numbers::pi * 1.5 * (t - 1)); }},
-          {"arbitrary, twelve frequencies up to 5 Hz, to the end", &arbitrary}};
+          {"arbitrary, twelve frequencies up to 5 Hz, to the end", &arbitrary},
+          {"steps of 1.3 deg in 40 ms, up and down in turn every 1.9 s, to the end", &steps_in_turn}};
 }
 
 constexpr double gauge_noise = 0.027, calibration_error = 0.0001, dt = 0.002;  // the calibration so good that it does not hide the rest
