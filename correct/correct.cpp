@@ -194,9 +194,12 @@ void describe_run(const CorrectProblem& problem, CorrectResult& result) {
   result.warnings = run.warnings;
 }
 
-/// Knots of one long motion this far apart still hold the bands in tests/studies/CORRECT.md; the acceleration of an oscillation is off by (omega h)^2 / 12. A shaft that moves and rests by turns
-/// moves fast: a step within 20 samples with a knot on every seventh is off by tens of standard deviations.
-Index farthest_knots(const std::vector<MotionBasis::Window>& windows) { return windows.size() > 1 ? 1 : 8; }  // samples
+/// Knots of the motion this far apart still hold the bands in tests/studies/CORRECT.md. A shaft that moves and rests by turns moves fast: a step within 20 samples with a knot on every seventh is off by
+/// tens of standard deviations.
+Index farthest_knots(const std::vector<MotionBasis::Window>& windows) { return windows.size() > 1 ? 1 : 3; }  // samples
+
+/// And so far that what a nonlinear force does to a long motion is hardly in the load; the acceleration of an oscillation is off by (omega h)^2 / 12.
+constexpr Index farthest_at_all = 8;
 
 bool too_far_apart(const std::vector<MotionBasis::Window>& windows) { return windows.front().stride > farthest_knots(windows); }
 
@@ -219,11 +222,12 @@ std::string knots_too_far_apart(const Run& run, const std::vector<MotionBasis::W
 /// The settled filter is for linear rigs: a nonlinear force has to do with the knots there are, and is told so.
 bool goes_from_sample_to_sample(const AeroelasticModel& model, const Run& run, const VectorXd& theta, const std::vector<MotionBasis::Window>& windows, std::vector<std::string>& warnings) {
   if (!too_far_apart(windows)) return false;
+  const Index most_at_all = farthest_at_all * most_knots(windows.size());
   if (model.system(conditions_of(run), theta, model.output_channels(run)).feedback.empty()) return true;
-  if (hardly_rests(run, windows))
+  if (windows.front().stride > farthest_at_all && hardly_rests(run, windows))
     throw NoAnswer(fmt::format("{}: the shaft moves nearly all the time, for longer than {} samples, and the fit names a nonlinear force. Such a motion is followed by {} knots, which lie too far apart here: "
                                "correct the run in parts of at most {} samples that begin at rest",
-                               run.file, most_moving(windows), most_knots(windows.size()), most_moving(windows)));
+                               run.file, most_at_all, most_knots(windows.size()), most_at_all));
   warnings.push_back(knots_too_far_apart(run, windows));
   return false;
 }

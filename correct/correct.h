@@ -58,7 +58,7 @@ struct CorrectResult {
 /// gauge and angle. Each amplitude has a normal prior around zero whose standard deviation maximises the evidence (correct/prior.h); it decides what the
 /// record leaves open. The answers at half and at twice its weight, 1/tau^2, are part of the result.
 ///
-/// Where the shaft moves for longer than the fit's knots can follow (in one motion a knot on every eighth sample will do, in several with rests between every sample needs one), motion and
+/// Where the shaft moves for longer than the fit's knots can follow (in one motion a knot on every third sample will do, in several with rests between every sample needs one), motion and
 /// load are found by a settled filter and smoother with a knot on every sample, in time and memory that go with the record (correct/restless_run.h, correct/restless_correction.h). It
 /// does not know the rests as such, so that the band is wider there. Nonlinear forces cannot be followed so: a warning says that the knots lie too far apart.
 ///
