@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include "core/command.h"
+#include "core/given_files.h"
 #include "core/text_file.h"
 #include "correct/correct.h"
 #include "correct/corrected_files.h"
@@ -45,6 +46,7 @@ int correct_command(int argc, char** argv) {
   } catch (const CLI::ParseError& e) {
     return app.exit(e) == 0 ? exit_done : exit_wrong_use;
   }
+  check_outputs({{"-o", output}, {"--indicial", indicial}}, {rig_path, fit_path, run_path});
   Progress progress;
   progress("reading " + run_path);
   const CorrectProblem problem{read_rig(rig_path), read_fit(fit_path), read_run(run_path), calibration, imposed};

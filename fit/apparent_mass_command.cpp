@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include "core/command.h"
+#include "core/given_files.h"
 #include "core/text_file.h"
 #include "fit/apparent_mass.h"
 #include "fit/apparent_mass_files.h"
@@ -26,6 +27,7 @@ int apparent_mass_command(int argc, char** argv) {
     return app.exit(e) == 0 ? exit_done : exit_wrong_use;
   }
 
+  check_outputs({{"-o", output}}, {rig_path, dry_path, wet_path});
   ApparentMassProblem problem;
   problem.rig = read_rig(rig_path);
   problem.dry = read_run(dry_path);

@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include "core/command.h"
+#include "core/given_files.h"
 #include "core/in_parallel.h"
 #include "core/text_file.h"
 #include "fit/effect_option.h"
@@ -34,6 +35,9 @@ int fit_command(int argc, char** argv) {
     return app.exit(e) == 0 ? exit_done : exit_wrong_use;
   }
 
+  std::vector<std::string> inputs = run_paths;
+  inputs.push_back(rig_path);
+  check_outputs({{"-o", output}}, inputs);
   std::erase_if(problem.profile, [](const std::string& name) { return name.empty() || name == "{}"; });  // how CLI11 says that nothing follows
   if (profile->count() > 0 && problem.profile.empty()) problem.profile = {"all"};
   problem.rig = read_rig(rig_path);

@@ -9,6 +9,7 @@
 #include <optional>
 
 #include "core/command.h"
+#include "core/given_files.h"
 #include "core/indicial_table.h"
 #include "core/run_text.h"
 #include "core/scan.h"
@@ -177,6 +178,7 @@ int simulate_command(int argc, char** argv) {
     return app.exit(e) == 0 ? exit_done : exit_wrong_use;
   }
 
+  check_outputs({{"-o", options.output}}, {options.rig, options.run, options.fit, options.indicial});
   const SimulateProblem problem = problem_of(options);
   Progress progress;
   progress("simulating " + options.run);

@@ -5,6 +5,7 @@
 
 #include "core/command.h"
 #include "core/error.h"
+#include "core/given_files.h"
 #include "core/text_file.h"
 #include "correct/report/result_files.h"
 
@@ -55,6 +56,7 @@ int report_command(int argc, char** argv) {
   } catch (const CLI::ParseError& e) {
     return app.exit(e) == 0 ? exit_done : exit_wrong_use;
   }
+  check_outputs({{"-o", output}}, results);
   if (title.empty())
     for (const std::string& path : results) title += (title.empty() ? "" : ", ") + file_name(path);
   ReportPage page(title);

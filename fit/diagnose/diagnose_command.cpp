@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include "core/command.h"
+#include "core/given_files.h"
 #include "core/in_parallel.h"
 #include "core/text_file.h"
 #include "fit/diagnose/diagnose.h"
@@ -31,6 +32,10 @@ int diagnose_command(int argc, char** argv) {
   } catch (const CLI::ParseError& e) {
     return app.exit(e) == 0 ? exit_done : exit_wrong_use;
   }
+  std::vector<std::string> inputs = runs;
+  inputs.insert(inputs.end(), heldout.begin(), heldout.end());
+  inputs.push_back(rig);
+  check_outputs({{"-o", output}, {"--fit", fit_output}}, inputs);
   problem.rig = read_rig(rig);
   for (const std::string& path : runs) problem.runs.push_back(read_run(path));
   for (const std::string& path : heldout) problem.heldout.push_back(read_run(path));

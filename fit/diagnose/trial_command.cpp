@@ -5,6 +5,7 @@
 
 #include "core/command.h"
 #include "core/error.h"
+#include "core/given_files.h"
 #include "core/in_parallel.h"
 #include "core/text_file.h"
 #include "core/units.h"
@@ -33,6 +34,7 @@ int trial_command(int argc, char** argv) {
   } catch (const CLI::ParseError& e) {
     return app.exit(e) == 0 ? exit_done : exit_wrong_use;
   }
+  check_outputs({{"-o", output}}, {rig});
   problem.rig = read_rig(rig);
   for (const std::string& warning : problem.rig.warnings) warn(warning);
   problem.noise = quantity(noise, "N", {"--noise", 0}, "the noise");

@@ -1,0 +1,45 @@
+#include "core/given_files.h"
+
+#include <fmt/format.h>
+
+#include <filesystem>
+#include <system_error>
+
+#include "core/error.h"
+
+namespace unrig {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// How it is written elsewhere, where that is not the same.
+std::string as_given(const std::string& path, const std::string& other) { return path == other ? "" : " " + other; }
+
+void check_output(const Output& output, const std::vector<Output>& others, const std::vector<std::string>& inputs) {
+  const std::string advice = "Choose another name for " + output.option + ".";
+  for (const std::string& input : inputs)
+    if (same_file(output.path, input)) throw InputError({output.path, 0}, output.option + " would overwrite the input" + as_given(output.path, input), "wanted an output that is none of the inputs", advice);
+  for (const Output& other : others)
+    if (other.option != output.option && same_file(output.path, other.path))
+      throw InputError({output.path, 0}, fmt::format("{} would overwrite what {} writes{}", output.option, other.option, as_given(output.path, other.path)), "wanted a file for each of them", advice);
+}
+
+}  // namespace
+
+bool same_file(const std::string& a, const std::string& b) {
+  if (a.empty() || b.empty()) return false;
+  std::error_code failure;
+  const bool a_exists = fs::exists(a, failure), b_exists = fs::exists(b, failure);
+  if (a_exists && b_exists) return fs::equivalent(a, b, failure);  // of pipes and devices the system knows no such thing: they are never the same
+  if (a_exists || b_exists) return false;
+  const fs::path first = fs::weakly_canonical(fs::absolute(a, failure), failure), second = fs::weakly_canonical(fs::absolute(b, failure), failure);
+  return !first.empty() && first == second;
+}
+
+void check_outputs(const std::vector<Output>& outputs, const std::vector<std::string>& inputs) {
+  for (const Output& output : outputs)
+    // Into /dev/stdout and its like one may write after another.
+    if (!output.path.empty() && !output.path.starts_with("/dev/") && !output.path.starts_with("/proc/")) check_output(output, outputs, inputs);
+}
+
+}  // namespace unrig

@@ -1,0 +1,18 @@
+#pragma once
+#include <string>
+#include <vector>
+
+namespace unrig {
+
+/// A file that a command is to write, and the option that names it. An empty path: none is wanted.
+struct Output {
+  std::string option, path;
+};
+
+/// Whether two paths lead to one file, that need not exist yet: also through links, or with and without `./`.
+bool same_file(const std::string& a, const std::string& b);
+
+/// What a command asks before it reads or computes anything. Throws InputError where an output would overwrite an input or another output.
+void check_outputs(const std::vector<Output>& outputs, const std::vector<std::string>& inputs);
+
+}  // namespace unrig

@@ -1,0 +1,84 @@
+// What the commands say about the files they are called with, before they read or compute anything.
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "core/text_file.h"
+#include "tests/commands/run_unrig.h"
+#include "tests/support/sample_data.h"
+
+namespace unrig {
+namespace {
+
+using test::Finished;
+using test::null_campaign;
+using test::run_unrig;
+using test::TemporaryDirectory;
+using ::testing::HasSubstr;
+
+/// Copies of the sample campaign's files, which a command that does not see what it is asked may spoil.
+class GivenFiles : public ::testing::Test {
+ protected:
+  std::string copy(const std::string& name) const { return directory_.file(name, read_text(null_campaign(name))); }
+
+  /// Refuses with this message, and `kept` is what it was.
+  void refused(const std::vector<std::string>& arguments, const std::string& kept, const std::vector<std::string>& parts) const {
+    const std::string before = read_text(kept);
+    const Finished finished = run_unrig(directory_, arguments);
+    EXPECT_EQ(finished.status, 2) << finished.err;
+    for (const std::string& part : parts) EXPECT_THAT(finished.err, HasSubstr(part));
+    EXPECT_TRUE(read_text(kept) == before) << kept;
+  }
+
+  TemporaryDirectory directory_;
+  const std::string rig_ = copy("rig.toml"), step_ = copy("step_a.csv"), dry_ = copy("dry_pluck.csv"), wet_ = copy("wet_pluck.csv");
+  const std::string fit_ = directory_.file("fit.json", R"({"unrig": "fit", "parameters": []})");
+};
+
+TEST_F(GivenFiles, AnOutputDoesNotOverwriteAnInput) {
+  const std::string out = directory_.path("out"), message = ": -o would overwrite the input";
+  refused({"simulate", "--rig", rig_, "--run", step_, "-o", step_}, step_, {step_ + message + "; wanted ", "Choose another name for -o."});
+  refused({"simulate", "--rig", rig_, "--run", step_, "-o", rig_}, rig_, {rig_ + message});
+  refused({"fit", "--rig", rig_, dry_, wet_, "-o", wet_}, wet_, {wet_ + message});
+  refused({"apparent-mass", "--rig", rig_, "--dry", dry_, "--wet", wet_, "-o", dry_}, dry_, {dry_ + message});
+  refused({"diagnose", "--rig", rig_, wet_, "--heldout", step_, "-o", step_}, step_, {step_ + message});
+  refused({"diagnose", "--rig", rig_, wet_, "-o", out, "--fit", wet_}, wet_, {wet_ + ": --fit would overwrite the input"});
+  refused({"trial", "--rig", rig_, "--trials", "1", "-o", rig_}, rig_, {rig_ + message});
+  refused({"correct", "--rig", rig_, "--fit", fit_, step_, "-o", fit_}, fit_, {fit_ + message});
+  refused({"correct", "--rig", rig_, "--fit", fit_, step_, "-o", out, "--indicial", step_}, step_, {step_ + ": --indicial would overwrite the input"});
+  refused({"report", fit_, "-o", fit_}, fit_, {fit_ + message});
+}
+
+TEST_F(GivenFiles, NeitherThroughALinkNorAlongAnotherPath) {
+  const std::string link = directory_.path("link.csv"), detour = directory_.path("./step_a.csv");
+  std::filesystem::create_symlink(step_, link);
+  refused({"simulate", "--rig", rig_, "--run", step_, "-o", link}, step_, {link + ": -o would overwrite the input " + step_ + ";"});
+  refused({"simulate", "--rig", rig_, "--run", step_, "-o", detour}, step_, {detour + ": -o would overwrite the input " + step_ + ";"});
+}
+
+TEST_F(GivenFiles, TwoOutputsAreTwoFiles) {
+  const std::string out = directory_.path("same"), detour = directory_.path("./same");
+  for (const std::string& other : {out, detour}) {
+    refused({"correct", "--rig", rig_, "--fit", fit_, step_, "-o", out, "--indicial", other}, step_, {out + ": -o would overwrite what --indicial writes", "wanted a file for each of them"});
+    refused({"diagnose", "--rig", rig_, wet_, "-o", out, "--fit", other}, wet_, {out + ": -o would overwrite what --fit writes"});
+    EXPECT_FALSE(std::filesystem::exists(out));
+  }
+}
+
+TEST_F(GivenFiles, WhatAnEarlierCallWroteIsOverwritten) {
+  const std::string out = directory_.file("out.csv", "what an earlier call found");
+  EXPECT_EQ(run_unrig(directory_, {"simulate", "--rig", rig_, "--run", step_, "-o", out}).status, 0);
+  EXPECT_THAT(read_text(out), HasSubstr("unrig_run = 1"));
+}
+
+TEST_F(GivenFiles, WhatIsNoFileIsNeverTheSame) {
+  EXPECT_EQ(run_unrig(directory_, {"simulate", "--rig", rig_, "--run", step_, "-o", "/dev/null"}).status, 0);
+  refused({"correct", "--rig", rig_, "--fit", fit_, step_, "-o", "/dev/null", "--indicial", "/dev/null"}, fit_, {"fit.json", "normal.stiffness_scale"});
+}
+
+}  // namespace
+}  // namespace unrig
