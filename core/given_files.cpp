@@ -6,6 +6,7 @@
 #include <system_error>
 
 #include "core/error.h"
+#include "core/text_file.h"
 
 namespace unrig {
 namespace {
@@ -40,6 +41,8 @@ void check_outputs(const std::vector<Output>& outputs, const std::vector<std::st
   for (const Output& output : outputs)
     // Into /dev/stdout and its like one may write after another.
     if (!output.path.empty() && !output.path.starts_with("/dev/") && !output.path.starts_with("/proc/")) check_output(output, outputs, inputs);
+  for (const Output& output : outputs)
+    if (!output.path.empty()) check_writable(output.path);
 }
 
 }  // namespace unrig

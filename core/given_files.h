@@ -12,7 +12,8 @@ struct Output {
 /// Whether two paths lead to one file, that need not exist yet: also through links, or with and without `./`.
 bool same_file(const std::string& a, const std::string& b);
 
-/// What a command asks before it reads or computes anything. Throws InputError where an output would overwrite an input or another output.
+/// What a command asks before it reads or computes anything. Throws InputError where an output would overwrite an input or another output,
+/// or cannot be written (text_file.h): in time, and before one output is written whose fellow cannot be.
 void check_outputs(const std::vector<Output>& outputs, const std::vector<std::string>& inputs);
 
 }  // namespace unrig

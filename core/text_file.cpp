@@ -23,8 +23,8 @@ namespace fs = std::filesystem;
 
 std::string reason() { return std::strerror(errno); }
 
-[[noreturn]] void refuse_write(const std::string& path, const std::string& why) {
-  throw InputError({path, 0}, "the file cannot be written: " + why, "wanted a path that can be written", "");
+[[noreturn]] void refuse_write(const std::string& path, const std::string& why, const std::string& advice = "") {
+  throw InputError({path, 0}, "the file cannot be written: " + why, "wanted a path that can be written", advice);
 }
 
 /// An open file that closes itself, so that every way out is clean.
@@ -92,6 +92,9 @@ bool write_pieces(int file, const TextSource& text) {
     return false;
   }
 }
+
+/// /dev/stdout may lead to a regular file: whoever opened it goes on writing to it, so it must not be replaced.
+bool is_written_directly(const std::string& path, const struct stat& old) { return !S_ISREG(old.st_mode) || path.starts_with("/dev/") || path.starts_with("/proc/"); }
 
 /// Pipes and devices cannot be renamed over, and keep no half-written file either.
 void write_directly(const std::string& path, const TextSource& text) {
@@ -203,14 +206,22 @@ void write_text(const std::string& path, const std::string& text) {
   write_text(path, [&](const TextSink& sink) { sink(text); });
 }
 
-void write_text(const std::string& path, const TextSource& text) {
+void check_writable(const std::string& path) {
   const auto old = status(path);
   if (old && S_ISDIR(old->st_mode)) refuse_write(path, std::strerror(EISDIR));
-  // /dev/stdout may lead to a regular file: whoever opened it goes on writing to it, so it must not be replaced.
-  const bool descriptor = path.starts_with("/dev/") || path.starts_with("/proc/");
-  if (old && (!S_ISREG(old->st_mode) || descriptor)) return write_directly(path, text);
+  if (old && is_written_directly(path, *old)) return;
   // A rename would step over the write protection of the old file.
   if (old && ::access(path.c_str(), W_OK) != 0) refuse_write(path, reason());
+  const std::string folder = (followed(path).parent_path() / "").string();  // ends with /, so that a file in its place is an error too
+  if (::access(folder.empty() ? "./" : folder.c_str(), W_OK | X_OK) == 0) return;
+  const bool absent = errno == ENOENT;
+  refuse_write(path, reason(), absent ? "The folder " + folder + " is not there; make it first." : "");
+}
+
+void write_text(const std::string& path, const TextSource& text) {
+  check_writable(path);
+  const auto old = status(path);
+  if (old && is_written_directly(path, *old)) return write_directly(path, text);
 
   const fs::path target = followed(path);
   TemporaryFile temporary(target, 0666);

@@ -12,6 +12,10 @@ std::string read_text(const std::string& path);
 /// Throws InputError naming the path and the system's reason; the old file, if any, is untouched then.
 void write_text(const std::string& path, const std::string& text);
 
+/// What write_text can know of `path` before it writes, for a command that computes long: its folder is there, and neither it nor an old file is write-protected.
+/// Throws as write_text does.
+void check_writable(const std::string& path);
+
 /// Takes the next piece of a text.
 using TextSink = std::function<void(std::string_view)>;
 /// What hands a text to a sink, piece by piece: a table of a million rows need not stand in memory.

@@ -5,6 +5,7 @@
 
 #include <filesystem>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "core/text_file.h"
@@ -67,6 +68,24 @@ TEST_F(GivenFiles, TwoOutputsAreTwoFiles) {
     refused({"diagnose", "--rig", rig_, wet_, "-o", out, "--fit", other}, wet_, {out + ": -o would overwrite what --fit writes"});
     EXPECT_FALSE(std::filesystem::exists(out));
   }
+}
+
+TEST_F(GivenFiles, AnOutputWithoutAFolderIsRefusedBeforeAnythingIsComputed) {
+  const std::string nowhere = directory_.path("absent/out"), out = directory_.path("out");
+  const std::vector<std::string> parts{nowhere + ": the file cannot be written: No such file or directory; wanted ", "The folder " + directory_.path("absent/") + " is not there; make it first."};
+  // Neither the rig nor the recording is one: they are not even read.
+  const std::string rig = directory_.file("none.toml", "none"), run = directory_.file("none.csv", "none");
+  refused({"simulate", "--rig", rig, "--run", run, "-o", nowhere}, run, parts);
+  refused({"fit", "--rig", rig, run, "-o", nowhere}, run, parts);
+  refused({"apparent-mass", "--rig", rig, "--dry", run, "--wet", run, "-o", nowhere}, run, parts);
+  refused({"trial", "--rig", rig, "-o", nowhere}, rig, parts);
+  refused({"report", run, "-o", nowhere}, run, parts);
+  for (const auto& [first, second] : {std::pair{out, nowhere}, {nowhere, out}}) {
+    refused({"diagnose", "--rig", rig, run, "-o", first, "--fit", second}, run, parts);
+    refused({"correct", "--rig", rig, "--fit", fit_, run, "-o", first, "--indicial", second}, run, parts);
+  }
+  refused({"fit", "--rig", rig, run, "-o", rig + "/fit.json"}, rig, {"Not a directory"});
+  EXPECT_FALSE(std::filesystem::exists(out));
 }
 
 TEST_F(GivenFiles, WhatAnEarlierCallWroteIsOverwritten) {
