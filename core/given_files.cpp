@@ -45,4 +45,11 @@ void check_outputs(const std::vector<Output>& outputs, const std::vector<std::st
     if (!output.path.empty()) check_writable(output.path);
 }
 
+void check_given_once(const std::vector<std::string>& recordings) {
+  for (std::size_t i = 0; i < recordings.size(); ++i)
+    for (std::size_t j = 0; j < i; ++j)
+      if (same_file(recordings[i], recordings[j]))
+        throw InputError({recordings[i], 0}, "the recording is given twice" + (recordings[i] == recordings[j] ? "" : ", also as " + recordings[j]), "wanted each once: one recording counts once", "Leave one of them out.");
+}
+
 }  // namespace unrig

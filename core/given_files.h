@@ -16,4 +16,7 @@ bool same_file(const std::string& a, const std::string& b);
 /// or cannot be written (text_file.h): in time, and before one output is written whose fellow cannot be.
 void check_outputs(const std::vector<Output>& outputs, const std::vector<std::string>& inputs);
 
+/// Throws InputError where a recording is given twice: what is fitted to it would count twice.
+void check_given_once(const std::vector<std::string>& recordings);
+
 }  // namespace unrig

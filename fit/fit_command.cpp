@@ -38,6 +38,7 @@ int fit_command(int argc, char** argv) {
   std::vector<std::string> inputs = run_paths;
   inputs.push_back(rig_path);
   check_outputs({{"-o", output}}, inputs);
+  check_given_once(run_paths);
   std::erase_if(problem.profile, [](const std::string& name) { return name.empty() || name == "{}"; });  // how CLI11 says that nothing follows
   if (profile->count() > 0 && problem.profile.empty()) problem.profile = {"all"};
   problem.rig = read_rig(rig_path);

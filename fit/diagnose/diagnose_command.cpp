@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include "core/command.h"
+#include "core/error.h"
 #include "core/given_files.h"
 #include "core/in_parallel.h"
 #include "core/text_file.h"
@@ -13,6 +14,17 @@
 #include "fit/fit_files.h"
 
 namespace unrig {
+namespace {
+
+void check_heldout(const std::vector<std::string>& heldout, const std::vector<std::string>& fitted) {
+  check_given_once(heldout);
+  for (const std::string& path : heldout)
+    for (const std::string& run : fitted)
+      if (same_file(path, run))
+        throw InputError({path, 0}, "--heldout is among the runs too", "wanted another: a run that was fitted cannot test the prediction", "Leave it out of the runs, or leave --heldout away: then each run is left out in turn.");
+}
+
+}  // namespace
 
 int diagnose_command(int argc, char** argv) {
   DiagnoseProblem problem;
@@ -36,6 +48,8 @@ int diagnose_command(int argc, char** argv) {
   inputs.insert(inputs.end(), heldout.begin(), heldout.end());
   inputs.push_back(rig);
   check_outputs({{"-o", output}, {"--fit", fit_output}}, inputs);
+  check_given_once(runs);
+  check_heldout(heldout, runs);
   problem.rig = read_rig(rig);
   for (const std::string& path : runs) problem.runs.push_back(read_run(path));
   for (const std::string& path : heldout) problem.heldout.push_back(read_run(path));

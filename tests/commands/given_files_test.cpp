@@ -88,6 +88,24 @@ TEST_F(GivenFiles, AnOutputWithoutAFolderIsRefusedBeforeAnythingIsComputed) {
   EXPECT_FALSE(std::filesystem::exists(out));
 }
 
+TEST_F(GivenFiles, ARecordingCountsOnce) {
+  const std::string out = directory_.path("out"), link = directory_.path("link.csv"), detour = directory_.path("./wet_pluck.csv");
+  std::filesystem::create_symlink(wet_, link);
+  for (const std::string command : {"fit", "diagnose"}) {
+    refused({command, "--rig", rig_, wet_, dry_, wet_, "-o", out}, wet_, {wet_ + ": the recording is given twice; wanted each once: one recording counts once. Leave one of them out."});
+    for (const std::string& other : {link, detour}) refused({command, "--rig", rig_, wet_, dry_, other, "-o", out}, wet_, {other + ": the recording is given twice, also as " + wet_});
+  }
+  refused({"diagnose", "--rig", rig_, wet_, "--heldout", step_, "--heldout", step_, "-o", out}, step_, {step_ + ": the recording is given twice"});
+}
+
+TEST_F(GivenFiles, ARunThatIsFittedIsNotHeldOut) {
+  const std::string link = directory_.path("link.csv");
+  std::filesystem::create_symlink(wet_, link);
+  for (const std::string& heldout : {wet_, link})
+    refused({"diagnose", "--rig", rig_, dry_, wet_, "--heldout", heldout, "-o", directory_.path("out")}, wet_,
+            {heldout + ": --heldout is among the runs too; wanted another: a run that was fitted cannot test the prediction. Leave it out of the runs, or leave --heldout away"});
+}
+
 TEST_F(GivenFiles, WhatAnEarlierCallWroteIsOverwritten) {
   const std::string out = directory_.file("out.csv", "what an earlier call found");
   EXPECT_EQ(run_unrig(directory_, {"simulate", "--rig", rig_, "--run", step_, "-o", out}).status, 0);
