@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <stdexcept>
 
 #include "core/effects/effect.h"
@@ -11,7 +12,8 @@ namespace unrig {
 
 std::vector<std::string> effects_of_option(const std::string& option, const std::vector<std::string>& ids) try {
   std::vector<std::string> known;
-  for (const std::string& id : ids) known.push_back(effect(id).id);
+  for (const std::string& id : ids)
+    if (const std::string name = effect(id).id; std::find(known.begin(), known.end(), name) == known.end()) known.push_back(name);
   return known;
 } catch (const std::invalid_argument& e) {
   throw InputError({option, 0}, e.what(), "wanted one of these", "");

@@ -101,6 +101,17 @@ TEST(FitOptions, StartValuesAreReportedAsTheyWereGiven) {
   EXPECT_EQ(fit["parameters"][1]["start"], 1700);
 }
 
+TEST(FitOptions, AnEffectThatIsNamedTwiceActsOnce) {
+  const TemporaryDirectory directory;
+  const std::string run = decay(directory);
+  ASSERT_EQ(fit_of(directory, run, {"--effect", "quadratic-drag"}).status, 0);
+  const json once = json::parse(read_text(directory.path("fit.json")));
+  ASSERT_EQ(fit_of(directory, run, {"--effect", "quadratic-drag", "--effect", "quadratic-drag"}).status, 0);
+  const json twice = json::parse(read_text(directory.path("fit.json")));
+  EXPECT_EQ(twice["effects"].size(), 1u);
+  EXPECT_EQ(twice["parameters"], once["parameters"]);
+}
+
 TEST(FitOptions, NamesThatNoParameterHasAreRefused) {
   const TemporaryDirectory directory;
   for (const auto& [option, value] : {std::pair{"--start", "modal[2].mass=1"}, {"--profile", "stiffness"}}) {
