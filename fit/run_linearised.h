@@ -61,6 +61,14 @@ class Eliminator {
     }
     return scale_.asDiagonal() * x;
   }
+  /// Column j of (R^T R)^-1: how the unknowns move with the score of unknown j. Zero for one that the rows do not determine.
+  Eigen::VectorXd covariance_column(Eigen::Index j) const {
+    const Eigen::Index r = rank();
+    Eigen::VectorXd score = scale_[j] * Eigen::VectorXd::Unit(scale_.size(), j);
+    if (deficient_) score = pivoted_.colsPermutation().transpose() * score;
+    const auto& factors = deficient_ ? pivoted_.matrixQR() : quick_.factors();
+    return solve(factors.topLeftCorner(r, r).triangularView<Eigen::Upper>().transpose().solve(score.head(r)));
+  }
   /// R with R^T R = the columns' information matrix. Only where all columns are determined is it regular.
   Eigen::MatrixXd factor() const {
     const Eigen::Index n = scale_.size();

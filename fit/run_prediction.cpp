@@ -77,9 +77,8 @@ RunResidual::Sensitivity RunResidual::sensitivity(const VectorXd& theta) const {
   const Evaluation e = differentiate(solution);
   const Index parameters = static_cast<Index>(model_->parameters().size()), n = run_->samples();
   // c follows theta; and the first offset, theta held, is (R^T R)^-1 X^T noise in its row, X what c does to the weighted readings.
-  const auto factor = e.linear_factor.triangularView<Eigen::Upper>();
   MatrixXd moves(unknowns_, parameters + 1);
-  moves << e.linear_slope, factor.solve(factor.transpose().solve(VectorXd::Unit(unknowns_, first_offset_)));
+  moves << e.linear_slope, lin.eliminate->covariance_column(first_offset_);
   Sensitivity result;
   result.channels.assign(static_cast<std::size_t>(measured_.cols()), {VectorXd::Zero(n), MatrixXd::Zero(n, parameters + 1)});
   follow_partials(theta, solution.linear, {}, [&](std::size_t block, const Interval& s, const MatrixXd& m) {
