@@ -246,8 +246,8 @@ AeroelasticModel AeroelasticModel::with_effects(const std::vector<std::string>& 
   AeroelasticModel model = *this;
   for (const std::string& id : ids) {
     const Needs needs = effect(id).needs;
-    if (needs != Needs::any_rig && rig_.is_modal()) throw std::invalid_argument(fmt::format("the effect {} needs a beam rig; '{}' is known only as modes", id, rig_.name));
-    if (!has(rig_, needs)) throw std::invalid_argument(fmt::format("the effect {} needs a sensor of the twist; '{}' has none (rig file: [[sensor]] with reads = \"twist\")", id, rig_.name));
+    if (needs != Needs::any_rig && rig_.is_modal()) throw InputError({rig_.file, 0}, "a rig known only as modes", "wanted a beam rig, which the effect " + id + " needs", "Describe its section and chains, or leave the effect out.");
+    if (!has(rig_, needs)) throw InputError({rig_.file, 0}, "no sensor of the twist", "wanted one, which the effect " + id + " needs", "Add a [[sensor]] with reads = \"twist\", or leave the effect out.");
     for (Parameter p : effect(id).parameters) {
       p.name = id + "." + p.name;
       model.parameters_.push_back(p);

@@ -6,6 +6,7 @@
 
 #include "core/aeroelastic_model.h"
 #include "core/error.h"
+#include "core/units.h"
 
 namespace unrig {
 namespace {
@@ -32,6 +33,16 @@ void check_gauge_unit(const Run& run, const Rig& rig) {
   throw InputError({run.file, run.header_line}, fmt::format("the column \"gauge\" is in {}", gauge.file_unit),
                    fmt::format("wanted a unit of {}, which the gauge of the rig {} reads", wanted, rig.file),
                    raw ? "Write the calibration into the meta data." : "Give the rig file of this run.");
+}
+
+/// So must a sensor's column. Volts and counts will do where its gain is a plain number.
+void check_sensor_unit(const Run& run, const Sensor& sensor, const Rig& rig) {
+  const Channel& column = run.channel(sensor.column);
+  const InputError::Place place{run.file, run.header_line};
+  const bool raw = column.unit == "V" || column.unit == "1";
+  if (raw || sensor.unit.empty() || column.unit == si_unit(sensor.unit, place, sensor.column)) return;
+  throw InputError(place, fmt::format("the column \"{}\" is in {}", sensor.column, column.file_unit), fmt::format("wanted a unit of {}, which the sensor of the rig {} reads", sensor.unit, rig.file),
+                   "Correct the unit, or the sensor's gain in the rig file.");
 }
 
 /// Median of the first samples: the angle before the shaft moves.
@@ -65,7 +76,10 @@ std::vector<std::string> AeroelasticModel::output_channels(const Run& run) const
   if ((rig_.is_modal() || rig_.gauge_element > 0) && run.find("gauge")) channels.emplace_back("gauge");
   std::string wanted = channels.empty() && (rig_.is_modal() || rig_.gauge_element > 0) ? "a column 'gauge'" : "";
   for (const Sensor& sensor : rig_.sensors) {
-    if (run.find(sensor.column)) channels.push_back(sensor.column);
+    if (run.find(sensor.column)) {
+      check_sensor_unit(run, sensor, rig_);
+      channels.push_back(sensor.column);
+    }
     wanted += (wanted.empty() ? "a column '" : " or '") + sensor.column + "'";
   }
   if (channels.empty())

@@ -34,6 +34,9 @@ void check(const CorrectProblem& problem) {
   if (problem.rig.is_modal()) throw InputError({problem.rig.file, 0}, "a rig known only as modes", "wanted a rig with a section and strips", "Describe the section: without it there is no load to separate.");
   if (!run.find("alpha")) throw InputError({run.file, 0}, "no column 'alpha'", "wanted the measured angle of attack", "Record the angle beside the gauge.");
   if (!(run.speed > 0)) throw InputError({run.file, 0}, "speed 0", "wanted a run in a stream", "Circulation needs a stream; free decays are for `unrig fit`.");
+  const Rig& rig = problem.rig;
+  if (rig.gauge_element > 0 && std::none_of(rig.submerged.begin(), rig.submerged.end(), [&](int element) { return element > rig.gauge_element; }))
+    throw InputError({rig.file, 0}, "no submerged element outboard of the gauge", "wanted a section that loads the gauge", "Correct [section] elements or the gauge's element in the rig file.");
   if (problem.imposed.monotone && problem.imposed.at_step.value_or(0) > 1)
     throw InputError({run.file, 0}, fmt::format("a response that starts at {:g} and never falls", *problem.imposed.at_step), "wanted a start of at most 1, which is its limit", "");
 }
@@ -45,18 +48,23 @@ std::vector<std::string> effects_of_the_rig(const FittedRig& fit) {
   return ids;
 }
 
+/// The fit's modes, which the rig must have.
+Basis basis_of(const CorrectProblem& problem) try {
+  if (problem.fit.normal_modes > 0) return make_basis(problem.rig, problem.fit.normal_modes, problem.fit.torsion_modes);
+  return make_basis(problem.rig, 0.5 / problem.run.dt, problem.run.density);
+} catch (const std::invalid_argument& e) {
+  throw InputError({problem.fit.file, 0}, e.what(), "wanted a fit of the rig " + problem.rig.file, "Fit this rig to its free decays and steps first.");
+}
+
 /// The coupled model with a free build-up of circulation.
 AeroelasticModel free_model(const CorrectProblem& problem, double semichords) {
   const Run& run = problem.run;
   constexpr double beyond_the_record = 5;  // slower rates: what the limit still hides at its end
   const VectorXd rates = spread_rates(beyond_the_record * semichords);
-  const Basis basis = problem.fit.normal_modes > 0 ? make_basis(problem.rig, problem.fit.normal_modes, problem.fit.torsion_modes)
-                                                   : make_basis(problem.rig, 0.5 / run.dt, run.density);
+  const Basis basis = basis_of(problem);
   const AeroelasticModel model =
       AeroelasticModel(problem.rig, basis, {"free", wagner_amplitudes(rates, semichords), rates}, AeroelasticModel::Circulation::free).with_effects(effects_of_the_rig(problem.fit));
-  for (const Parameter& p : model.parameters())
-    if (!p.per_run && !problem.fit.find(p.name, run.file))
-      throw InputError({problem.fit.file, 0}, "no parameter \"" + p.name + "\"", "wanted a fit of the rig " + problem.rig.file, "Fit this rig to its free decays and steps first.");
+  check_is_fit_of(model, problem.fit, run.file);
   return model;
 }
 
@@ -134,7 +142,7 @@ MatrixXd interpolated(const MatrixXd& value, const std::vector<Index>& at, Index
 }
 
 /// Force per reading for a load that is spread evenly over the strips.
-double steady_per_reading(const Rig& rig) {
+double steady_per_reading(const Rig& rig) {  // `check` has seen to the arms
   const double gauge = rig.station[rig.gauge_element - 1], lever = rig.station[rig.calibration_element - 1] - gauge;
   double arms = 0;
   for (const int element : rig.submerged) arms += std::max(0.0, rig.station[element - 1] - gauge) / lever;
@@ -194,6 +202,23 @@ void describe_run(const CorrectProblem& problem, CorrectResult& result) {
   result.warnings = run.warnings;
 }
 
+/// Behind shorter ones the slope of a step of `sample_data/campaigns/null` that was cut was three of its standard deviations off and more; from 3.2 on one at most.
+constexpr double shortest_response = 3;  // semichords
+
+std::string too_short_for_a_limit(const Run& run, double semichords) {
+  return fmt::format("{}: the record ends {:.2g} semichords after the shaft sets out. It says what the load is there, but not how much of that is the slope and how much the response: both are "
+                     "extrapolated, with errors that are too small. Record {:g} semichords or more.",
+                     run.file, semichords, shortest_response);
+}
+
+void look_at_what_is_left(const Run& run, CorrectResult& result) {
+  constexpr double explained = 1.5;
+  if (result.reduced_chi2 > explained)
+    result.warnings.push_back(fmt::format("{}: gauge and angle are explained to a reduced chi-square of {:.3g} only. Something is missing from the rig of the fit, or it is another rig's: `unrig diagnose` looks "
+                                          "for it. The band is widened as if what is left were noise.",
+                                          run.file, result.reduced_chi2));
+}
+
 /// Knots of the motion this far apart still hold the bands in tests/studies/CORRECT.md. A shaft that moves and rests by turns moves fast: a step within 20 samples with a knot on every seventh is off by
 /// tens of standard deviations.
 Index farthest_knots(const std::vector<MotionBasis::Window>& windows) { return windows.size() > 1 ? 1 : 3; }  // samples
@@ -248,8 +273,10 @@ CorrectResult correct(const CorrectProblem& problem) {
   const AeroelasticModel model = free_model(problem, length);
   const VectorXd start = theta_for(model, problem.fit, run.file);
   const Prior prior = prior_of(model, problem.fit, start, run.file);
+  if (length < shortest_response) result.warnings.push_back(too_short_for_a_limit(run, length));
   if (goes_from_sample_to_sample(model, run, start, windows, result.warnings)) {
     correct_restless({model, run, prior, start, length, steady_per_reading(problem.rig), problem.imposed}, result);
+    look_at_what_is_left(run, result);
     return result;
   }
 
@@ -292,6 +319,7 @@ CorrectResult correct(const CorrectProblem& problem) {
   result.determined = best.determined;
   result.amplitudes = static_cast<Index>(best.prior.amplitudes.size());
   result.in_fit = !best.prior.held.empty();
+  look_at_what_is_left(run, result);
   return result;
 }
 

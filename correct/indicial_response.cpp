@@ -50,6 +50,7 @@ void find_bandwidth(const AeroelasticModel& model, const VectorXd& theta, const 
                     IndicialResponse& r) {
   constexpr Index per_decade = 20;
   const Index parameters = theta.size();
+  if (!(2 * std::numbers::pi / longest < model.circulation().rate.maxCoeff())) return;  // so short a record knows none
   const VectorXd reduced = spread_evenly(2 * std::numbers::pi / longest, model.circulation().rate.maxCoeff(), per_decade);  // w b / U
   using Complex = std::complex<double>;
   const auto term = [](double rate, double w) { return -Complex(0, w) / Complex(rate, w); };

@@ -136,9 +136,7 @@ MatrixXd parameter_root(const AeroelasticModel& model, const FittedRig& fit, con
 ModalLoad modal_load(const CorrectProblem& problem) {
   const Run& run = problem.run;
   const AeroelasticModel model(problem.rig, {}, {});
-  for (const Parameter& p : model.parameters())
-    if (!problem.fit.find(p.name, run.file))
-      throw InputError({problem.fit.file, 0}, "no parameter \"" + p.name + "\"", "wanted a fit of the rig " + problem.rig.file, "Fit this rig first.");
+  check_is_fit_of(model, problem.fit, run.file);
   if (!problem.fit.effects.empty()) throw InputError({problem.fit.file, 0}, "a fit with effects, of a rig known only as modes", "wanted one without", "");
   model.output_channels(run);  // refuses a run of another rig
   const VectorXd theta = theta_for(model, problem.fit, run.file);

@@ -4,7 +4,6 @@
 #include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
-#include <filesystem>
 #include <utility>
 
 #include "correct/constrained_step.h"
@@ -15,11 +14,6 @@ namespace {
 using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
-
-bool took_part(const FittedRig& fit, const std::string& run_file) {
-  const auto name = [](const std::string& path) { return std::filesystem::path(path).filename(); };
-  return std::any_of(fit.runs.begin(), fit.runs.end(), [&](const std::string& run) { return name(run) == name(run_file); });
-}
 
 /// Covariance of rig parameters, as far as the fit has one.
 MatrixXd rig_covariance(const AeroelasticModel& model, const FittedRig& fit, const VectorXd& theta, const std::vector<Index>& rig, const std::string& run_file) {
@@ -116,7 +110,7 @@ Prior prior_of(const AeroelasticModel& model, const FittedRig& fit, const Vector
   constexpr double slow = 0.05;  // per semichord
   prior.share = (model.circulation().rate.array() / slow).min(1.0);
   const MatrixXd root = root_of(rig_covariance(model, fit, theta, rig, run_file));
-  if (took_part(fit, run_file)) {
+  if (!fit.recorded_as(run_file).empty()) {
     prior.held = rig;
     prior.held_root = root;
     prior.known.resize(0, theta.size());

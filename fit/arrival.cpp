@@ -126,7 +126,12 @@ Arrival grow(Arrival start, const FitProblem& problem, const ArrivalEffort& effo
 
 void set_starts(JointProblem& joint, const std::map<std::string, double>& starts) {
   for (Unknown& u : joint.unknowns())
-    if (const auto found = starts.find(joint.parameter(u).name); found != starts.end()) u.value = found->second;
+    if (const auto found = starts.find(joint.parameter(u).name); found != starts.end()) {
+      const Parameter& p = joint.parameter(u);
+      if (!(found->second >= p.lower && found->second <= p.upper))
+        throw InputError({"--start", 0}, fmt::format("{}={:g}", p.name, found->second), fmt::format("wanted a value from {:g} to {:g}", p.lower, p.upper), "");
+      u.value = found->second;
+    }
 }
 
 Arrival first_guess(const FitProblem& problem, const std::shared_ptr<const AeroelasticModel>& model, const Windows& windows, const std::map<std::string, double>& starts) {

@@ -1,6 +1,9 @@
 #include "fit/fit_files.h"
 
+#include <algorithm>
 #include <cmath>
+#include <filesystem>
+#include <vector>
 
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
@@ -13,6 +16,15 @@ namespace unrig {
 namespace {
 
 using nlohmann::json;
+namespace fs = std::filesystem;
+
+/// In how many names, from the file's own on backwards, two paths agree.
+std::ptrdiff_t folders_in_common(const fs::path& a, const fs::path& b) {
+  std::error_code none;
+  const fs::path whole = fs::weakly_canonical(b, none), &other = whole.empty() ? b : whole;
+  const std::vector<fs::path> left(a.begin(), a.end()), right(other.begin(), other.end());
+  return std::mismatch(left.rbegin(), left.rend(), right.rbegin(), right.rend()).first - left.rbegin();
+}
 
 constexpr std::pair<Wagner, const char*> circulation_names[] = {
     {Wagner::within_1e4, "1e-4"}, {Wagner::within_1e6, "1e-6"}, {Wagner::jones, "jones"}, {Wagner::seed, "seed"}};
@@ -21,6 +33,25 @@ const char* name_of(Wagner which) {
   for (const auto& [value, name] : circulation_names)
     if (value == which) return name;
   return "";
+}
+
+/// That of `known` which is the recording `file`: the same path or the same file; where the fit's own file is no longer where it was, the one that agrees with it in most names.
+std::string same_recording(const std::vector<std::string>& known, const fs::path& fit_file, const std::string& file) {
+  if (std::find(known.begin(), known.end(), file) != known.end()) return file;
+  std::string best;
+  std::ptrdiff_t most_in_common = 0;
+  for (const std::string& own : known) {
+    std::error_code none;
+    bool moved = true;
+    for (const fs::path& there : {fs::path(own), fit_file.parent_path() / own}) {
+      if (!fs::exists(there, none)) continue;
+      if (fs::equivalent(there, file, none)) return own;
+      moved = false;
+    }
+    const std::ptrdiff_t in_common = folders_in_common(own, file);
+    if (moved && in_common > most_in_common) best = own, most_in_common = in_common;
+  }
+  return best;
 }
 
 /// JSON knows no NaN.
@@ -150,14 +181,21 @@ FittedRig read_fit(const json& in, const std::string& path) {
   }
 }
 
+std::string FittedRig::recorded_as(const std::string& run_file) const { return same_recording(runs, file, run_file); }
+
 const FittedParameter* FittedRig::find(const std::string& name, const std::string& run_file) const {
-  const FittedParameter* alike = nullptr;  // by the file's name alone: the recordings may have moved
-  for (const FittedParameter& p : parameters) {
-    if (p.name != name) continue;
-    if (p.run.empty() || p.run == run_file) return &p;
-    if (!alike && base_name(p.run) == base_name(run_file)) alike = &p;
-  }
-  return alike;
+  std::vector<std::string> own;
+  for (const FittedParameter& p : parameters)
+    if (p.name == name && !p.run.empty()) own.push_back(p.run);
+  const std::string run = same_recording(own, file, run_file);
+  const auto found = std::find_if(parameters.begin(), parameters.end(), [&](const FittedParameter& p) { return p.name == name && (p.run.empty() || (!run.empty() && p.run == run)); });
+  return found == parameters.end() ? nullptr : &*found;
+}
+
+void check_is_fit_of(const AeroelasticModel& model, const FittedRig& fit, const std::string& run_file) {
+  for (const Parameter& p : model.parameters())
+    if (!p.per_run && !fit.find(p.name, run_file))
+      throw InputError({fit.file, 0}, "no parameter \"" + p.name + "\"", "wanted a fit of the rig " + model.rig().file, "Fit this rig to its free decays and steps first.");
 }
 
 double FittedRig::value(const std::string& name, const std::string& run_file, double missing) const {

@@ -19,13 +19,18 @@ struct FittedRig {
   Eigen::MatrixXd correlation;
   std::vector<std::string> runs;
 
-  /// The value of a parameter, of this run (by its path, or else by file name without folders) where it has its own; `missing` where there is none.
+  /// The recording that the fit knows this file as, empty if it took no part: the same path or file; by its name, and the folders that agree, only where the fit's own file is no longer there.
+  std::string recorded_as(const std::string& run_file) const;
+  /// The value of a parameter, of this run (known likewise) where it has its own; `missing` where there is none.
   double value(const std::string& name, const std::string& run_file, double missing) const;
   const FittedParameter* find(const std::string& name, const std::string& run_file) const;
 };
 
 /// Throws InputError where the file is not a fit.
 FittedRig read_fit(const std::string& path);
+
+/// Throws InputError where a parameter of the rig is none of the fit: it is a fit of another rig.
+void check_is_fit_of(const AeroelasticModel& model, const FittedRig& fit, const std::string& run_file);
 
 /// theta of `model` for a run: the fit's values, and the model's start values for what the fit does not name. For a run that was not fitted
 /// the slope is the mean over the fitted runs that have one.

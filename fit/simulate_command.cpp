@@ -99,6 +99,9 @@ SimulateProblem problem_of(const Options& options) {
 
   SimulateProblem problem{{rig, basis_of(rig, run, fit, options), circulation_of(options, fit, table)}, {}, std::move(run), {}, {}, {}};
   if (fit && !fit->effects.empty()) problem.model = problem.model.with_effects(fit->effects);
+  const auto is_fitted = [&](const Parameter& p) { return fit->find(p.name, problem.run.file) != nullptr; };
+  if (fit && std::none_of(problem.model.parameters().begin(), problem.model.parameters().end(), is_fitted))
+    throw InputError({fit->file, 0}, "no parameter of the rig " + rig.file, "wanted a fit of this rig", "Fit it, or leave --fit away.");
   problem.theta = fit ? theta_for(problem.model, *fit, problem.run.file) : problem.model.start_values();
   if (fit)
     if (const FittedParameter* steady = fit->find(steady_name, problem.run.file)) problem.steady_normal_force = steady->value;

@@ -37,10 +37,13 @@ TomlTable parse_mapping(const std::string& text, const std::string& file) {
 const RecordedChannel& source_of(const TomlTable& table, const Recording& recording) {
   const std::string name = table.text("source");
   std::vector<std::string> names;
+  const RecordedChannel* found = nullptr;
   for (const RecordedChannel& channel : recording.channels) {
-    if (channel.name == name) return channel;
+    if (channel.name == name && found) table.fail("source", fmt::format("{} holds more than one channel \"{}\"", recording.file, name), "wanted a name that only one of them has; rename the others in the recording");
+    if (channel.name == name) found = &channel;
     names.push_back("\"" + channel.name + "\"");
   }
+  if (found) return *found;
   constexpr std::size_t most = 40;
   if (names.size() > most) names.resize(most);
   table.fail("source", fmt::format("{} holds no channel \"{}\"", recording.file, name), fmt::format("wanted one of: {}", fmt::join(names, ", ")));

@@ -46,6 +46,16 @@ Finished fit_of(const TemporaryDirectory& directory, const std::string& run, con
   return run_unrig(directory, arguments);
 }
 
+TEST(FitOptions, AStartBeyondItsBoundsAndAnEffectThatTheRigCannotHaveAreRefused) {
+  const TemporaryDirectory directory;
+  const Finished start = fit_of(directory, decay(directory), {"--start", "modal[1].stiffness=-1"});
+  EXPECT_EQ(start.status, 2);
+  EXPECT_THAT(start.err, HasSubstr("wanted a value from"));
+  const Finished effect = fit_of(directory, decay(directory), {"--effect", "tank-wave"});
+  EXPECT_EQ(effect.status, 2);
+  EXPECT_THAT(effect.err, testing::AllOf(HasSubstr("rig.toml"), HasSubstr("wanted a beam rig, which the effect tank-wave needs")));
+}
+
 TEST(FitOptions, WhatIsDeterminedIsGivenWhereAParameterIsNot) {
   const TemporaryDirectory directory;
   const Finished finished = fit_of(directory, decay(directory), {});

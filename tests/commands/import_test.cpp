@@ -86,6 +86,7 @@ TEST(ImportCommand, RefusesAndLeavesNothingBehind) {
   const std::vector<std::pair<std::string, std::string>> bad{{directory.file("text.txt", "F\n1\nx\n2\n"), "\"x\""},
                                                              {directory.file("other.txt", "G\n1\n2\n3\n"), "no channel \"F\""},
                                                              {directory.file("short.txt", "F\n1\n2\n"), "rows"},
+                                                             {directory.file("twice.txt", "F,F\n1,2\n2,3\n3,4\n"), "more than one channel \"F\""},
                                                              {directory.file("binary.bin", std::string("\x7f\0\1\2", 4)), "binary"},
                                                              {directory.file("cut.tdms", "TDSm"), "TDMS"},
                                                              {directory.file("cut.mat", "MATLAB 5.0"), "MATLAB"},

@@ -73,6 +73,14 @@ TEST_F(SimulateCommand, TakesParametersFromAFit) {
   EXPECT_EQ((read_run(output()).channel("gauge").value - gauge).norm(), 0);
 }
 
+TEST_F(SimulateCommand, TheFitOfAnotherRigIsRefused) {
+  const std::string fit = directory_.file("fit.json", R"({"unrig": "fit", "circulation": "jones", "parameters": [{"name": "modal[1].mass", "value": 2, "std_error": 0.1, "unit": "kg"}]})");
+  const Outcome outcome = simulate(rig_and_step() + "--fit " + fit);
+  EXPECT_EQ(outcome.status, 2);
+  EXPECT_THAT(outcome.err, HasSubstr("no parameter of the rig"));
+  EXPECT_FALSE(std::filesystem::exists(output()));
+}
+
 TEST_F(SimulateCommand, PluckNeedsAndTakesAReleaseLoad) {
   const std::string pluck = std::string(UNRIG_SOURCE_DIR) + "/sample_data/campaigns/null/dry_pluck.csv";
   const std::string arguments = "--rig " + seed + "rig_from_drawings.toml --run " + pluck + " -o " + output();

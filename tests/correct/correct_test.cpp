@@ -177,6 +177,33 @@ TEST(Correct, SaysWhatItCannotCorrect) {
   EXPECT_THAT(refusal({null_rig(), null_fit(), step, 0}), ::testing::AllOf(HasSubstr("input: "), HasSubstr("alpha")));
 }
 
+/// The first of each channel's samples.
+unrig::Run cut(unrig::Run run, Index samples) {
+  for (Channel& c : run.channels) c.value.conservativeResize(samples);
+  return run;
+}
+
+TEST(Correct, SaysThatAShortRecordKnowsNoLimit) {
+  const unrig::Run step = read_run(test::null_campaign("step_a.csv"));
+  for (const Index samples : {525, 600}) EXPECT_THAT(correct({null_rig(), null_fit(), cut(step, samples), 0}).warnings, testing::Contains(HasSubstr("semichords after the shaft sets out"))) << samples;
+  EXPECT_THAT(correct({null_rig(), null_fit(), cut(step, 900), 0}).warnings, testing::Not(testing::Contains(HasSubstr("semichords after the shaft sets out"))));
+}
+
+TEST(Correct, SaysWhenTheRigOfTheFitDoesNotExplainTheReadings) {
+  unrig::Run step = read_run(test::null_campaign("step_a.csv"));
+  EXPECT_TRUE(correct({null_rig(), null_fit(), step, 0}).warnings.empty());
+  for (Channel& c : step.channels)
+    if (c.name == "gauge")
+      for (Index k = 0; k < c.value.size(); ++k) c.value[k] += 0.3 * std::sin(2 * 3.14159265 * 11 * 0.002 * static_cast<double>(k));  // ten times the noise, at no frequency of the rig
+  EXPECT_THAT(correct({null_rig(), null_fit(), step, 0}).warnings, testing::Contains(HasSubstr("unrig diagnose")));
+}
+
+TEST(Correct, RefusesASectionThatDoesNotLoadTheGauge) {
+  Rig inboard = null_rig();
+  inboard.submerged = {1, 2};
+  EXPECT_THAT(refusal({inboard, null_fit(), read_run(test::null_campaign("step_a.csv")), 0}), HasSubstr("no submerged element outboard of the gauge"));
+}
+
 TEST(Correct, RefusesTheFitOfAnotherRig) {
   FittedRig other;
   other.file = "other.json";

@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <filesystem>
+
 #include <nlohmann/json.hpp>
 
 #include "core/error.h"
@@ -34,6 +36,26 @@ TEST(FitFiles, CarryTheStepsInWhichLawsWereFollowed) {
   json wrong = written(4);
   wrong["law_steps"] = 0;
   EXPECT_THROW(read_back(wrong), InputError);
+}
+
+TEST(FitFiles, ARecordingIsKnownByItsFileAndByItsNameOnlyWhereThatIsGone) {
+  const test::TemporaryDirectory directory;
+  std::filesystem::create_directories(directory.path("day1"));
+  std::filesystem::create_directories(directory.path("day2"));
+  const std::string first = directory.file("day1/step.csv", "1"), second = directory.file("day2/step.csv", "2");
+  FittedRig fit;
+  fit.file = directory.path("day1/fit.json");
+  fit.runs = {first};
+  EXPECT_EQ(fit.recorded_as(first), first);
+  EXPECT_EQ(fit.recorded_as(directory.path("day1/../day1/step.csv")), first) << "the same file by another path";
+  EXPECT_EQ(fit.recorded_as(second), "") << "another recording of that name";
+  fit.runs = {"step.csv"};  // as seen from its own folder
+  EXPECT_EQ(fit.recorded_as(first), "step.csv");
+  EXPECT_EQ(fit.recorded_as(second), "");
+  fit.runs = {"elsewhere/day1/step.csv", "elsewhere/day2/step.csv"};  // both have moved
+  EXPECT_EQ(fit.recorded_as(second), "elsewhere/day2/step.csv");
+  EXPECT_EQ(fit.recorded_as(first), "elsewhere/day1/step.csv");
+  EXPECT_EQ(fit.recorded_as(directory.path("day2/other.csv")), "");
 }
 
 }  // namespace

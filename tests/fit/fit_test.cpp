@@ -6,12 +6,14 @@
 #include <cmath>
 #include <limits>
 #include <numbers>
+#include <random>
 #include <string>
 #include <vector>
 
 #include <nlohmann/json.hpp>
 
 #include "core/error.h"
+#include "core/simulate.h"
 #include "core/text_file.h"
 #include "fit/fit_files.h"
 #include "tests/support/sample_data.h"
@@ -84,6 +86,43 @@ TEST(Fit, OfTheCampaignWithoutHiddenEffectsFindsItsRig) {
     EXPECT_NEAR(run.channels.front().noise / answers["runs"][name]["sigma"].get<double>(), 1, 0.08) << run.file;
     EXPECT_NEAR(run.channels.front().rms_residual / answers["runs"][name]["sigma"].get<double>(), 1, 0.06) << run.file;
   }
+}
+
+/// The lags of the circulation start anyhow too, and the slowest look like an offset of the gauge.
+TEST(Fit, OfADecayInAStreamAndOneInAirFindsTheRig) {
+  const Rig rig = read_rig(test::null_campaign("rig.toml"));
+  const AeroelasticModel model(rig, make_basis(rig, 0.5 / 0.0005, 998.2), wagner(Wagner::within_1e6));
+  VectorXd theta = model.start_values();
+  const std::vector<std::pair<const char*, double>> truth{{"normal.stiffness_scale", 0.9}, {"torsion.stiffness_scale", 1.1}, {"apparent_mass_coefficient", 1.05}};
+  for (const auto& [name, value] : truth) theta[model.index(name)] = value;
+  FitProblem problem;
+  problem.rig = rig;
+  std::mt19937_64 random(5);
+  std::normal_distribution<double> noise(0, 0.03);
+  for (const double speed : {0.0, 0.6}) {
+    unrig::Run run;
+    run.file = speed > 0 ? "in_a_stream.csv" : "in_air.csv";
+    run.kind = RunKind::pluck;
+    run.density = speed > 0 ? 998.2 : 1.2;
+    run.speed = speed;
+    run.dt = 0.0005;
+    run.channels.push_back({"alpha", "rad", "rad", 1, VectorXd::Zero(10000), 0});
+    unrig::Run fine = simulate({model, theta, run, PitchBetweenSamples::spline, 20.0, std::nullopt}).run;
+    fine.dt = 0.002;
+    fine.channels = {channel(fine, "gauge")};
+    VectorXd& gauge = fine.channels.front().value;
+    gauge = gauge(Eigen::seq(0, Eigen::last, 4)).eval();
+    for (double& reading : gauge) reading += noise(random);
+    problem.runs.push_back(fine);
+  }
+  const FitResult result = fit(problem);
+  for (const auto& [name, value] : truth) {
+    const FittedParameter& p = parameter(result, name);
+    EXPECT_TRUE(p.identified) << name;
+    EXPECT_NEAR(p.value, value, 4 * p.std_error) << name;
+    EXPECT_LT(p.std_error, 0.05) << name;
+  }
+  EXPECT_NEAR(result.reduced_chi2(), 1, 0.1);
 }
 
 TEST(Fit, DoesNotDependOnTheOrderOfTheRuns) {
