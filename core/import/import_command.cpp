@@ -5,6 +5,7 @@
 
 #include "core/command.h"
 #include "core/error.h"
+#include "core/given_files.h"
 #include "core/import/import.h"
 #include "core/text_file.h"
 
@@ -45,6 +46,7 @@ int import_command(int argc, char** argv) {
     return app.exit(e) == 0 ? exit_done : exit_wrong_use;
   }
   if (!list && (map.empty() || output.empty())) throw InputError({path, 0}, "--map or --output is missing", "wanted both, or --list", "`unrig import --help` shows an example.");
+  if (!list) check_outputs({{"-o", output}}, {path, map});
   const std::string mapping = map.empty() ? "unrig_import = 1\n" : read_text(map);
   Progress progress;
   progress("reading " + path);

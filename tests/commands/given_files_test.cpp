@@ -54,6 +54,12 @@ TEST_F(GivenFiles, AnOutputDoesNotOverwriteAnInput) {
   refused({"report", fit_, "-o", fit_}, fit_, {fit_ + message});
 }
 
+TEST_F(GivenFiles, AnImportDoesNotOverwriteWhatItReads) {
+  const std::string recording = directory_.file("recording.csv", "F\n1\n2\n3\n"), map = directory_.file("map.toml", "unrig_import = 1\n");
+  for (const std::string& input : {recording, map}) refused({"import", recording, "--map", map, "-o", input}, input, {input + ": -o would overwrite the input"});
+  EXPECT_EQ(run_unrig(directory_, {"import", recording, "--list", "-o", recording}).status, 0) << "nothing is written";
+}
+
 TEST_F(GivenFiles, NeitherThroughALinkNorAlongAnotherPath) {
   const std::string link = directory_.path("link.csv"), detour = directory_.path("./step_a.csv");
   std::filesystem::create_symlink(step_, link);
