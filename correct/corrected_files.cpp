@@ -4,6 +4,8 @@
 #include <filesystem>
 #include <iterator>
 #include <numbers>
+#include <string>
+#include <vector>
 
 #include <fmt/format.h>
 
@@ -77,7 +79,10 @@ std::string indicial_report(const CorrectResult& r) {
     while (i < last && response.semichords[i] < s) ++i;
     return fmt::format("{:.4f} +/- {:.2g} at {:.3g}", response.value[i], response.uncertainty.std[i], response.semichords[i]);
   };
-  std::string text = fmt::format("    indicial response    {}, {}, {}, {} semichords\n", at(0.5), at(2), at(8), at(30));
+  std::vector<std::string> points;
+  for (const double s : {0.5, 2.0, 8.0, 30.0})
+    if (const std::string point = at(s); points.empty() || point != points.back()) points.push_back(point);  // a short record ends before
+  std::string text = fmt::format("    indicial response    {} semichords\n", fmt::join(points, ", "));
   text += fmt::format("        at the step      {}{:.3f} +/- {:.2g} ({:+.1f} standard deviations from 1/2); 1 at infinity, which is the slope\n",
                       r.imposed.at_step ? fmt::format("{:g} imposed; without that ", *r.imposed.at_step) : "", response.at_step, response.at_step_std,
                       (response.at_step - 0.5) / response.at_step_std);
