@@ -49,10 +49,21 @@ const RecordedChannel& source_of(const TomlTable& table, const Recording& record
   table.fail("source", fmt::format("{} holds no channel \"{}\"", recording.file, name), fmt::format("wanted one of: {}", fmt::join(names, ", ")));
 }
 
+/// "deg" and "°", "N/m" and "newton/metre".
+bool same_unit(const std::string& a, const std::string& b) try {
+  const InputError::Place nowhere{"", 0};
+  const std::string si = si_unit(a, nowhere, a);
+  if (si != si_unit(b, nowhere, b)) return false;
+  const UnitScale one = unit_scale(a, si, nowhere, a), other = unit_scale(b, si, nowhere, b);
+  return one(0) == other(0) && one(1) == other(1);
+} catch (const InputError&) {
+  return false;  // a unit that UDUNITS does not know
+}
+
 /// The channel's unit: the file's, or the mapping's where the file gives none. A contradiction is an error: one of the two is wrong.
 std::string unit_of(const TomlTable& table, const RecordedChannel& channel) {
   const std::string told = table.text_or("unit", "");
-  if (!told.empty() && !channel.unit.empty() && told != channel.unit)
+  if (!told.empty() && !channel.unit.empty() && told != channel.unit && !same_unit(told, channel.unit))
     table.fail("unit", fmt::format("the unit is \"{}\" here and \"{}\" in the file, for \"{}\"", told, channel.unit, channel.name), "wanted the same, or none here",
                "Where the file is wrong, mend it there: nobody can see it in the run file any more.");
   const std::string unit = told.empty() ? channel.unit : told;

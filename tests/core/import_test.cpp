@@ -90,6 +90,9 @@ TEST(Import, NamesWhatIsWrongInAMapping) {
   EXPECT_THAT(with("[run]\n"), HasSubstr("unrig_import = 1"));
   EXPECT_THAT(with(head + "[[column]]\nname = \"gauge\"\nsource = \"brigde\"\n"), HasSubstr("\"bridge\""));
   EXPECT_THAT(with(head + "[[column]]\nname = \"gauge\"\nsource = \"bridge\"\nunit = \"V\"\n"), HasSubstr("\"mV\" in the file"));
+  EXPECT_EQ(parse_run(import_recording(recording(), head + "[[column]]\nname = \"gauge\"\nsource = \"bridge\"\nunit = \"millivolt\"\n", "m").text, "r").channel("gauge").value[3],
+            parse_run(import_recording(recording(), head + "[[column]]\nname = \"gauge\"\nsource = \"bridge\"\n", "m").text, "r").channel("gauge").value[3])
+      << "another name of the same unit";
   EXPECT_THAT(with(head + "[[column]]\nname = \"gauge\"\nsource = \"bridge\"\ncolour = 1\n"), HasSubstr("column[1].colour"));
   EXPECT_THAT(with(head + "[[column]]\nname = \"ga,uge\"\nsource = \"bridge\"\n"), HasSubstr("without comma"));
   Recording uneven = recording();
