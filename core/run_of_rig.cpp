@@ -35,7 +35,7 @@ void check_gauge_unit(const Run& run, const Rig& rig) {
                    raw ? "Write the calibration into the meta data." : "Give the rig file of this run.");
 }
 
-/// So must a sensor's column. Volts and counts will do where its gain is a plain number.
+/// So must a sensor's column. Volts and counts will do where its gain is a plain number; a rig made in code may leave the unit open.
 void check_sensor_unit(const Run& run, const Sensor& sensor, const Rig& rig) {
   const Channel& column = run.channel(sensor.column);
   const InputError::Place place{run.file, run.header_line};

@@ -9,6 +9,7 @@
 #include <nlohmann/json.hpp>
 
 #include "core/effects/effect.h"
+#include "core/given_files.h"
 #include "core/text_file.h"
 #include "fit/fit_json.h"
 
@@ -45,7 +46,7 @@ std::string same_recording(const std::vector<std::string>& known, const fs::path
     bool moved = true;
     for (const fs::path& there : {fs::path(own), fit_file.parent_path() / own}) {
       if (!fs::exists(there, none)) continue;
-      if (fs::equivalent(there, file, none)) return own;
+      if (same_file(there.string(), file)) return own;
       moved = false;
     }
     const std::ptrdiff_t in_common = folders_in_common(own, file);

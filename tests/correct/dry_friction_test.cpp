@@ -4,8 +4,6 @@
 
 #include <cmath>
 #include <string>
-#include <tuple>
-#include <vector>
 
 #include "tests/correct/null_campaign.h"
 
@@ -17,26 +15,15 @@ using Eigen::VectorXd;
 
 std::string campaign(const std::string& file) { return test::source_path("sample_data/campaigns/friction/" + file); }
 
-/// What `unrig fit --effect coulomb-friction` finds in the campaign's five runs (minutes, hence written down), here without correlations.
+/// What `unrig fit --effect coulomb-friction` finds in the campaign's five runs.
 FittedRig friction_fit() {
-  FittedRig fit;
-  fit.file = "friction.json";
-  fit.effects = {"coulomb-friction"};
-  for (const auto& [name, value, std_error] : std::vector<std::tuple<const char*, double, double>>{{"normal.stiffness_scale", 0.77967544, 1.9e-5},
-                                                                                                  {"torsion.stiffness_scale", 0.79955863, 3.3e-4},
-                                                                                                  {"normal.damping_ratio", 0.01727096, 1.8e-5},
-                                                                                                  {"torsion.damping_ratio", 0.02423625, 3.6e-4},
-                                                                                                  {"apparent_mass_coefficient", 1.01503881, 3.4e-5},
-                                                                                                  {"coulomb-friction.force", 0.73196892, 3.2e-4},
-                                                                                                  {"coulomb-friction.velocity", 1.3008441e-4, 1.1e-6}}) {
-    fit.parameters.emplace_back();
-    fit.parameters.back().name = name;
-    fit.parameters.back().value = value;
-    fit.parameters.back().std_error = std_error;
-  }
-  fit.correlation = Eigen::MatrixXd::Identity(static_cast<Index>(fit.parameters.size()), static_cast<Index>(fit.parameters.size()));
-  fit.runs = {"step_a.csv", "step_b.csv", "step_c.csv"};
-  return fit;
+  return test::written_fit("coulomb-friction", {{"normal.stiffness_scale", 0.77967544, 1.9e-5},
+                                                {"torsion.stiffness_scale", 0.79955863, 3.3e-4},
+                                                {"normal.damping_ratio", 0.01727096, 1.8e-5},
+                                                {"torsion.damping_ratio", 0.02423625, 3.6e-4},
+                                                {"apparent_mass_coefficient", 1.01503881, 3.4e-5},
+                                                {"coulomb-friction.force", 0.73196892, 3.2e-4},
+                                                {"coulomb-friction.velocity", 1.3008441e-4, 1.1e-6}});
 }
 
 class DryFriction : public ::testing::TestWithParam<const char*> {};

@@ -4,7 +4,6 @@
 
 #include <cmath>
 #include <string>
-#include <tuple>
 #include <vector>
 
 #include "tests/correct/null_campaign.h"
@@ -17,25 +16,14 @@ using Eigen::VectorXd;
 
 std::string campaign(const std::string& file) { return test::source_path("sample_data/campaigns/drag/" + file); }
 
-/// What `unrig fit --effect quadratic-drag` finds in the campaign's five runs, here without correlations.
+/// What `unrig fit --effect quadratic-drag` finds in the campaign's five runs.
 FittedRig drag_fit() {
-  FittedRig fit;
-  fit.file = "drag.json";
-  fit.effects = {"quadratic-drag"};
-  for (const auto& [name, value, std_error] : std::vector<std::tuple<const char*, double, double>>{{"normal.stiffness_scale", 0.729847055, 2.5e-6},
-                                                                                                  {"torsion.stiffness_scale", 0.940770658, 2.1e-3},
-                                                                                                  {"normal.damping_ratio", 0.00720837768, 1.1e-6},
-                                                                                                  {"torsion.damping_ratio", 0.0187228863, 1.3e-3},
-                                                                                                  {"apparent_mass_coefficient", 0.983688621, 1.3e-5},
-                                                                                                  {"quadratic-drag.coefficient", 8.35112857, 2.0e-3}}) {
-    fit.parameters.emplace_back();
-    fit.parameters.back().name = name;
-    fit.parameters.back().value = value;
-    fit.parameters.back().std_error = std_error;
-  }
-  fit.correlation = Eigen::MatrixXd::Identity(static_cast<Index>(fit.parameters.size()), static_cast<Index>(fit.parameters.size()));
-  fit.runs = {"step_a.csv", "step_b.csv", "step_c.csv"};
-  return fit;
+  return test::written_fit("quadratic-drag", {{"normal.stiffness_scale", 0.729847055, 2.5e-6},
+                                              {"torsion.stiffness_scale", 0.940770658, 2.1e-3},
+                                              {"normal.damping_ratio", 0.00720837768, 1.1e-6},
+                                              {"torsion.damping_ratio", 0.0187228863, 1.3e-3},
+                                              {"apparent_mass_coefficient", 0.983688621, 1.3e-5},
+                                              {"quadratic-drag.coefficient", 8.35112857, 2.0e-3}});
 }
 
 TEST(LawSteps, OfAFitRefineTheLoadAsTheirSquareAndWithinItsBand) {

@@ -1,6 +1,7 @@
 #pragma once
 #include <stdexcept>
 #include <string>
+#include <vector>
 
 #include "core/csv_table.h"
 #include "core/text_file.h"
@@ -30,6 +31,28 @@ inline const FittedRig& null_fit() {
     return read_fit(directory.file("fit.json", to_json(fit(problem))));
   }();
   return fitted;
+}
+
+struct WrittenParameter {
+  std::string name;
+  double value, std_error;
+};
+
+/// The fit of a campaign's five runs with this effect, its values written down because it takes seconds to minutes; without correlations.
+inline FittedRig written_fit(const std::string& effect, const std::vector<WrittenParameter>& parameters) {
+  FittedRig fit;
+  fit.file = effect + ".json";
+  fit.effects = {effect};
+  for (const WrittenParameter& written : parameters) {
+    FittedParameter& p = fit.parameters.emplace_back();
+    p.name = written.name;
+    p.value = written.value;
+    p.std_error = written.std_error;
+  }
+  const auto count = static_cast<Eigen::Index>(parameters.size());
+  fit.correlation = Eigen::MatrixXd::Identity(count, count);
+  fit.runs = {"step_a.csv", "step_b.csv", "step_c.csv"};
+  return fit;
 }
 
 inline CorrectProblem null_problem(const std::string& run) { return {null_rig(), null_fit(), read_run(null_campaign(run + ".csv")), 0}; }
