@@ -1,6 +1,6 @@
 #!/bin/sh
 # Set-up, build, every test. The last line is the count.
-# The tests called sanitised.* and fuzz.* run under AddressSanitizer and UBSan: readers of files and pointer kernels. Of the rest only sanitize.sh makes such a build.
+# With UNRIG_SANITIZE=ON in the environment, as CI has it, all but the longest run a second time under AddressSanitizer and UBSan, as sanitised.*; sanitize.sh runs these too.
 set -eu
 cd "$(dirname "$0")/.."
 sh sample_data/setup.sh

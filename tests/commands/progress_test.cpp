@@ -14,6 +14,7 @@ namespace {
 
 using test::null_campaign;
 using test::TemporaryDirectory;
+using test::unrig_binary;
 using ::testing::HasSubstr;
 using ::testing::Not;
 
@@ -24,7 +25,7 @@ TEST(Progress, IsSeenOnATerminalAndGoneAtTheEnd) {
   const std::string erase = "\r\033[K";
   const auto on_a_terminal = [&](const std::string& arguments) {
     const std::string seen = directory.path("seen");
-    EXPECT_EQ(std::system(("script -qec '" UNRIG_BINARY " " + arguments + "' /dev/null >" + seen + " 2>&1 </dev/null").c_str()), 0) << read_text(seen);
+    EXPECT_EQ(std::system(("script -qec '" + unrig_binary() + " " + arguments + "' /dev/null >" + seen + " 2>&1 </dev/null").c_str()), 0) << read_text(seen);
     return read_text(seen);
   };
   const std::vector<std::string> commands{"fit --rig " + rig + " " + null_campaign("dry_pluck.csv") + " " + step + " -o " + fit,
@@ -38,7 +39,7 @@ TEST(Progress, IsSeenOnATerminalAndGoneAtTheEnd) {
     EXPECT_EQ(seen.substr(shown + 4, erase.size()), erase) << command;
     // Piped, the same command says nothing of it.
     const std::string err = directory.path("err");
-    ASSERT_EQ(std::system((UNRIG_BINARY " " + command + " >/dev/null 2>" + err).c_str()), 0);
+    ASSERT_EQ(std::system((unrig_binary() + " " + command + " >/dev/null 2>" + err).c_str()), 0);
     EXPECT_THAT(read_text(err), Not(HasSubstr(" ..."))) << command;
     EXPECT_THAT(read_text(err), Not(HasSubstr("\033"))) << command;
   }

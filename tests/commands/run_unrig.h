@@ -11,6 +11,7 @@
 #include <string>
 #include <vector>
 
+#include "tests/commands/unrig_binary.h"
 #include "tests/support/temporary_directory.h"
 
 extern char** environ;
@@ -31,7 +32,7 @@ inline std::string whole_file(const std::string& path) {
 
 /// Runs `unrig ARGUMENTS...` and waits for its end. Standard output and error go to files of `directory`, so neither can fill up a pipe.
 inline Finished run_unrig(const TemporaryDirectory& directory, const std::vector<std::string>& arguments) {
-  std::vector<std::string> words{UNRIG_BINARY};
+  std::vector<std::string> words{unrig_binary()};
   words.insert(words.end(), arguments.begin(), arguments.end());
   std::vector<char*> argv;
   for (std::string& word : words) argv.push_back(word.data());
@@ -43,11 +44,11 @@ inline Finished run_unrig(const TemporaryDirectory& directory, const std::vector
   posix_spawn_file_actions_addopen(&actions, STDOUT_FILENO, out.c_str(), O_WRONLY | O_CREAT | O_TRUNC, 0600);
   posix_spawn_file_actions_addopen(&actions, STDERR_FILENO, err.c_str(), O_WRONLY | O_CREAT | O_TRUNC, 0600);
   pid_t child = 0;
-  const int failure = posix_spawn(&child, UNRIG_BINARY, &actions, nullptr, argv.data(), environ);
+  const int failure = posix_spawn(&child, argv.front(), &actions, nullptr, argv.data(), environ);
   posix_spawn_file_actions_destroy(&actions);
   Finished finished;
   if (failure != 0) {
-    ADD_FAILURE() << UNRIG_BINARY << " cannot be started";
+    ADD_FAILURE() << argv.front() << " cannot be started";
     return finished;
   }
   int status = 0;

@@ -5,6 +5,7 @@
 #include <string>
 
 #include "core/text_file.h"
+#include "tests/commands/unrig_binary.h"
 #include "tests/support/temporary_directory.h"
 
 namespace unrig::test {
@@ -18,7 +19,7 @@ struct Outcome {
 /// Runs `unrig ARGUMENTS` through the shell; arguments with blanks need quotes.
 inline Outcome unrig(const std::string& arguments, const TemporaryDirectory& directory) {
   const std::string out = directory.path("stdout.txt"), err = directory.path("stderr.txt");
-  const int status = std::system((std::string(UNRIG_BINARY) + " " + arguments + " >" + out + " 2>" + err).c_str());
+  const int status = std::system((unrig_binary() + " " + arguments + " >" + out + " 2>" + err).c_str());
   return {WIFEXITED(status) ? WEXITSTATUS(status) : -1, read_text(out), read_text(err)};
 }
 

@@ -18,11 +18,12 @@ using test::Finished;
 using test::null_campaign;
 using test::run_unrig;
 using test::TemporaryDirectory;
+using test::unrig_binary;
 using ::testing::HasSubstr;
 
 /// `unrig simulate` of a step with this output, under shell settings such as limits, by a program such as setpriv. Returns the shell's exit status.
 int simulate(const std::string& settings, const std::string& output, const TemporaryDirectory& directory, const std::string& by = "") {
-  const std::string command = settings + " exec " + by + UNRIG_BINARY " simulate --rig " + null_campaign("rig.toml") + " --run " + null_campaign("step_a.csv") + " -o " + output + " >/dev/null 2>" + directory.path("err");
+  const std::string command = settings + " exec " + by + unrig_binary() + " simulate --rig " + null_campaign("rig.toml") + " --run " + null_campaign("step_a.csv") + " -o " + output + " >/dev/null 2>" + directory.path("err");
   const int status = std::system(("sh -c \"" + command + "\"").c_str());
   return WIFEXITED(status) ? WEXITSTATUS(status) : -1;
 }
@@ -68,7 +69,7 @@ TEST(WholeOrNot, AReadOnlyFolderIsAnErrorAndKeepsTheOldFile) {
   namespace fs = std::filesystem;
   // Permission bits do not bind root.
   const std::string by = ::geteuid() == 0 ? "setpriv --reuid=65534 --regid=65534 --clear-groups " : "";
-  if (std::system((by + "test -x " UNRIG_BINARY " -a -r " + null_campaign("rig.toml") + " 2>/dev/null").c_str()) != 0)
+  if (std::system((by + "test -x " + unrig_binary() + " -a -r " + null_campaign("rig.toml") + " 2>/dev/null").c_str()) != 0)
     GTEST_SKIP() << "root can take on no other user here who may read the build and the sample data";
   const TemporaryDirectory directory;
   fs::create_directory(directory.path("out"));
