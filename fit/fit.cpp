@@ -13,6 +13,7 @@
 #include "fit/gauss_newton.h"
 #include "fit/uncertainty.h"
 #include "fit/undetermined.h"
+#include "fit/unheard.h"
 
 namespace unrig {
 namespace {
@@ -51,8 +52,9 @@ ParameterUncertainty settle(Arrival& arrival, const FitProblem& problem, bool st
   refine(arrival, problem);
   if (steps) settle_steps(arrival);
   ParameterUncertainty uncertainty = estimate_uncertainty(arrival.joint);
-  constexpr int rounds = 3;  // what was a line of the noise may turn out to be nothing at all once its damping is held
-  for (int round = 0; round < rounds && hold_weak(arrival.joint, uncertainty, problem.start); ++round) {
+  constexpr int rounds = 4;  // what was a line of the noise may turn out to be nothing at all once its damping is held
+  const auto hold = [&] { return hold_unheard(arrival.joint, uncertainty, problem.start) || hold_weak(arrival.joint, uncertainty, problem.start); };
+  for (int round = 0; round < rounds && hold(); ++round) {
     solve(arrival);
     uncertainty = estimate_uncertainty(arrival.joint);
   }
