@@ -271,7 +271,7 @@ CorrectResult correct(const CorrectProblem& problem) {
   const auto onset = static_cast<double>(moving(alpha, noise_level(alpha)).front().first);
   const double length = (static_cast<double>(run.samples()) - onset) * run.dt * result.semichords_per_second;
   const AeroelasticModel model = free_model(problem, length);
-  const VectorXd start = theta_for(model, problem.fit, run.file);
+  const VectorXd start = theta_for(model, problem.fit, run.file, conditions_of(run).onset_angle);
   const Prior prior = prior_of(model, problem.fit, start, run.file);
   if (length < shortest_response) result.warnings.push_back(too_short_for_a_limit(run, length));
   if (goes_from_sample_to_sample(model, run, start, windows, result.warnings)) {

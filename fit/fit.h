@@ -51,6 +51,7 @@ struct FittedChannel {
 
 struct FittedRun {
   std::string file;
+  double onset_angle = 0;  ///< rad (RunConditions)
   Eigen::Index samples = 0;
   double chi2 = 0;
   Eigen::Index degrees_of_freedom = 0;

@@ -102,6 +102,7 @@ FittedRun describe_run(const RunResidual& residual, const VectorXd& theta, doubl
   const RunResidual::Prediction p = residual.predict(theta);
   FittedRun fitted;
   fitted.file = run.file;
+  fitted.onset_angle = residual.conditions().onset_angle;
   fitted.samples = run.samples();
   fitted.chi2 = chi2;
   fitted.degrees_of_freedom = residual.degrees_of_freedom();

@@ -117,7 +117,7 @@ std::string to_json(const FitResult& r) {
       channels.push_back({{"name", c.name}, {"unit", c.unit}, {"samples", c.samples}, {"missing", c.missing}, {"spikes", c.spikes},
                           {"rms_residual", number(c.rms_residual)}, {"noise", number(c.noise)}});
     const FittedChannel& first = run.channels.front();
-    out["runs"].push_back({{"file", run.file}, {"samples", run.samples}, {"rms_residual", number(first.rms_residual)}, {"noise", number(first.noise)},
+    out["runs"].push_back({{"file", run.file}, {"onset_angle", number(run.onset_angle)}, {"samples", run.samples}, {"rms_residual", number(first.rms_residual)}, {"noise", number(first.noise)},
                            {"unit", first.unit}, {"reduced_chi2", number(run.reduced_chi2())}, {"whiteness", number(run.whiteness)}, {"explained", run.explained()},
                            {"followed", number(run.followed)}, {"channels", channels}});
   }
@@ -173,7 +173,10 @@ FittedRig read_fit(const json& in, const std::string& path) {
       for (Eigen::Index i = 0; i < n; ++i)
         for (Eigen::Index j = 0; j < n; ++j) fit.correlation(i, j) = rows.at(static_cast<std::size_t>(i)).at(static_cast<std::size_t>(j)).get<double>();
     }
-    for (const json& run : in.value("runs", json::array())) fit.runs.push_back(run.value("file", ""));
+    for (const json& run : in.value("runs", json::array())) {
+      fit.runs.push_back(run.value("file", ""));
+      fit.onset_angles.push_back(run.contains("onset_angle") && run["onset_angle"].is_number() ? run["onset_angle"].get<double>() : std::nan(""));
+    }
     return fit;
   } catch (const json::exception& e) {
     throw refuse(e.what());
@@ -204,7 +207,12 @@ double FittedRig::value(const std::string& name, const std::string& run_file, do
   return p ? p->value : missing;
 }
 
-Eigen::VectorXd theta_for(const AeroelasticModel& model, const FittedRig& fit, const std::string& run_file) {
+Eigen::VectorXd theta_for(const AeroelasticModel& model, const FittedRig& fit, const std::string& run_file, double onset_angle) {
+  const auto away = [&](const FittedParameter& p) {  // of the run that a parameter belongs to
+    const auto run = std::find(fit.runs.begin(), fit.runs.end(), p.run);
+    const double angle = run == fit.runs.end() ? onset_angle : fit.onset_angles[static_cast<std::size_t>(run - fit.runs.begin())];
+    return std::isfinite(angle - onset_angle) ? std::abs(angle - onset_angle) : 0;
+  };
   Eigen::VectorXd theta = model.start_values();
   for (std::size_t j = 0; j < model.parameters().size(); ++j) {
     const Parameter& p = model.parameters()[j];
@@ -213,10 +221,13 @@ Eigen::VectorXd theta_for(const AeroelasticModel& model, const FittedRig& fit, c
       value = fitted->value;
       continue;
     }
-    double sum = 0;
+    double sum = 0, nearest = std::numeric_limits<double>::infinity();
     int count = 0;
-    for (const FittedParameter& other : fit.parameters)
-      if (other.name == p.name) sum += other.value, ++count;
+    for (const FittedParameter& other : fit.parameters) {
+      if (other.name != p.name || away(other) > nearest) continue;
+      if (away(other) < nearest) sum = count = 0, nearest = away(other);
+      sum += other.value, ++count;
+    }
     if (count > 0) value = sum / count;
   }
   return theta;

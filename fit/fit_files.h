@@ -1,4 +1,5 @@
 #pragma once
+#include <limits>
 #include <string>
 
 #include "fit/fit.h"
@@ -18,6 +19,7 @@ struct FittedRig {
   std::vector<FittedParameter> parameters;
   Eigen::MatrixXd correlation;
   std::vector<std::string> runs;
+  std::vector<double> onset_angles;  ///< rad, of the runs; not a number in a fit.json of an earlier version
 
   /// The recording that the fit knows this file as, empty if it took no part: the same path or file; by its name, and the folders that agree, only where the fit's own file is no longer there.
   std::string recorded_as(const std::string& run_file) const;
@@ -32,9 +34,9 @@ FittedRig read_fit(const std::string& path);
 /// Throws InputError where a parameter of the rig is none of the fit: it is a fit of another rig.
 void check_is_fit_of(const AeroelasticModel& model, const FittedRig& fit, const std::string& run_file);
 
-/// theta of `model` for a run: the fit's values, and the model's start values for what the fit does not name. For a run that was not fitted
-/// the slope is the mean over the fitted runs that have one.
-Eigen::VectorXd theta_for(const AeroelasticModel& model, const FittedRig& fit, const std::string& run_file);
+/// theta of `model` for a run: the fit's values, and the model's start values for what the fit does not name. For a run that was not fitted the slope of the normal force is that of the
+/// fitted run that began at the angle nearest to `onset_angle`, because the slope falls towards stall; without that angle, the mean of the fitted slopes.
+Eigen::VectorXd theta_for(const AeroelasticModel& model, const FittedRig& fit, const std::string& run_file, double onset_angle = std::numeric_limits<double>::quiet_NaN());
 
 /// Text report: statistics, variables with error, percentage and start value, correlations of at least `least`, runs.
 std::string report(const FitResult& result, double least = 0.1);

@@ -17,6 +17,7 @@
 #include "core/text_file.h"
 #include "core/units.h"
 #include "fit/fit_files.h"
+#include "fit/shaft_motion.h"
 
 namespace unrig {
 namespace {
@@ -29,7 +30,7 @@ struct Options {
   std::string rig, run, fit, output, circulation, indicial, release_load;
   Index normal_modes = 0, torsion_modes = 0;
   std::vector<std::string> settings;
-  bool jumps = false;
+  bool jumps = false, as_recorded = false;
 };
 
 IndicialFunction circulation_of(const Options& options, const std::optional<FittedRig>& fit, const std::optional<TabulatedIndicial>& table) {
@@ -86,11 +87,22 @@ void set(const std::string& setting, SimulateProblem& problem) {
     throw InputError(place, fmt::format("no parameter is called \"{}\"", name), "wanted one of: " + names, "");
 }
 
+/// A measured angle is replaced by the motion that it says.
+void take_out_noise_of_the_angle(const Rig& rig, Run& run) {
+  const std::optional<ShaftMotion> motion = shaft_motion(rig, run);
+  if (!motion) return;
+  for (Channel& channel : run.channels)
+    if (channel.name == "alpha") channel.value = motion->angle;
+  constexpr double degree = std::numbers::pi / 180;
+  warn(fmt::format("{}: the angle is a measurement, with a noise of {:.2g} deg; simulated is the smooth motion that it says (--as-recorded: every reading as it is)", run.file, motion->noise / degree));
+}
+
 SimulateProblem problem_of(const Options& options) {
   const Rig rig = read_rig(options.rig);
   for (const std::string& warning : rig.warnings) warn(warning);
   Run run = read_run(options.run);
   for (const std::string& warning : run.warnings) warn(warning);
+  if (!options.as_recorded && !options.jumps) take_out_noise_of_the_angle(rig, run);
   std::optional<FittedRig> fit;
   if (!options.fit.empty()) fit = read_fit(options.fit);
 
@@ -102,7 +114,7 @@ SimulateProblem problem_of(const Options& options) {
   const auto is_fitted = [&](const Parameter& p) { return fit->find(p.name, problem.run.file) != nullptr; };
   if (fit && std::none_of(problem.model.parameters().begin(), problem.model.parameters().end(), is_fitted))
     throw InputError({fit->file, 0}, "no parameter of the rig " + rig.file, "wanted a fit of this rig", "Fit it, or leave --fit away.");
-  problem.theta = fit ? theta_for(problem.model, *fit, problem.run.file) : problem.model.start_values();
+  problem.theta = fit ? theta_for(problem.model, *fit, problem.run.file, conditions_of(problem.run).onset_angle) : problem.model.start_values();
   if (fit)
     if (const FittedParameter* steady = fit->find(steady_name, problem.run.file)) problem.steady_normal_force = steady->value;
   if (table && table->slope && !rig.is_modal()) problem.theta[problem.model.index("normal_force_slope")] = *table->slope;
@@ -174,6 +186,7 @@ int simulate_command(int argc, char** argv) {
   app.add_option("--set", options.settings, "name=value of a model parameter (formats as in fit.json), in SI; may be repeated");
   app.add_option("--release-load", options.release_load, "load at the calibration element that a pluck is released from, such as \"20 N\"");
   app.add_flag("--jumps", options.jumps, "the angle jumps from sample to sample: ideal steps, in place of a spline");
+  app.add_flag("--as-recorded", options.as_recorded, "every reading of the angle as it is, its noise too; otherwise a measured angle is simulated as the smooth motion that it says");
   app.footer("Example:\n  unrig simulate --rig rig.toml --run step.csv --set normal.damping_ratio=0 -o simulated.csv");
   try {
     app.parse(argc, argv);

@@ -11,7 +11,7 @@ std::vector<FitTrace> fit_traces(const Rig& rig, const FittedRig& fit, const Run
                                               : make_basis(rig, 0.5 / run.dt, run.density);
   AeroelasticModel model(rig, basis, wagner(fit.circulation));
   if (!fit.effects.empty()) model = model.with_effects(fit.effects);
-  const Eigen::VectorXd theta = theta_for(model, fit, run.file);
+  const Eigen::VectorXd theta = theta_for(model, fit, run.file, conditions_of(run).onset_angle);
   RunResidual residual(model, run, motion_windows(run));
   residual.settle_noise(theta);
   residual.reject_spikes(theta);

@@ -25,6 +25,22 @@ class SimulateCommand : public testing::Test {
   TemporaryDirectory directory_;
 };
 
+/// In the rig that the campaign was simulated with, the noise of the angle alone would shake the gauge by a newton, thirty times its noise.
+TEST_F(SimulateCommand, AMeasuredAngleIsTakenForTheMotionThatItSays) {
+  const std::string campaign = std::string(UNRIG_SOURCE_DIR) + "/sample_data/campaigns/null/";
+  const std::string arguments = "--rig " + campaign + "rig.toml --run " + campaign + "step_a.csv -o " + output() + " --set normal.stiffness_scale=0.7887 --set torsion.stiffness_scale=0.8014 " +
+                                "--set normal.damping_ratio=0.00812 --set torsion.damping_ratio=0.0272 --set apparent_mass_coefficient=1.1219 --set normal_force_slope=5.8636 ";  // KEY.json
+  const auto apart = [&](const std::string& options) {
+    const Outcome done = simulate(arguments + options);
+    EXPECT_EQ(done.status, 0) << done.err;
+    EXPECT_THAT(done.err, HasSubstr(options.empty() ? "simulated is the smooth motion that it says" : "alpha carries noise")) << options;
+    const Eigen::VectorXd difference = read_run(campaign + "step_a.csv").channel("gauge").value - read_run(output()).channel("gauge").value;
+    return std::sqrt((difference.array() - difference.mean()).square().mean());
+  };
+  EXPECT_LT(apart(""), 1.2 * 0.0272);
+  EXPECT_GT(apart("--as-recorded"), 0.5);
+}
+
 TEST_F(SimulateCommand, WritesARunThatReadsBack) {
   const Outcome done = simulate(rig_and_step());
   EXPECT_EQ(done.status, 0) << done.err;

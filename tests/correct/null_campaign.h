@@ -1,25 +1,17 @@
 #pragma once
-#include <stdexcept>
 #include <string>
 #include <vector>
 
-#include "core/csv_table.h"
 #include "core/text_file.h"
 #include "correct/correct.h"
 #include "fit/fit.h"
+#include "tests/support/csv_column.h"
 #include "tests/support/sample_data.h"
 #include "tests/support/temporary_directory.h"
 
 namespace unrig::test {
 
 inline Rig null_rig() { return read_rig(null_campaign("rig.toml")); }
-
-/// A column of a CSV file without metadata, as it stands there.
-inline Eigen::VectorXd column_of(const std::string& file, const std::string& name) {
-  for (const CsvColumn& c : read_csv(read_text(file), 1, file).columns)
-    if (c.name == name) return c.value;
-  throw std::invalid_argument(file + " has no column " + name);
-}
 
 /// What `unrig fit` finds in the five runs, read back from its file; once per process.
 inline const FittedRig& null_fit() {
