@@ -46,6 +46,10 @@ void solve(Arrival& arrival, const JointProblem::SolveOptions& options = {});
 /// Noise levels from what the model leaves, spikes, and windows of the motion that the gauge asks to be wider; solves again after each.
 void refine(Arrival& arrival, const FitProblem& problem);
 
+/// Of a beam rig some of whose runs are left with more than chance leaves of their noise: once more from stiffnesses of torsion and of the normal modes a half lower and higher. One mode
+/// may have taken a resonance of another, beside which its own is small.
+void look_elsewhere(Arrival& arrival);
+
 /// Whether a parameter of this name is some effect's.
 bool belongs_to_an_effect(const std::string& parameter);
 

@@ -50,6 +50,7 @@ void settle_steps(Arrival& arrival) {
 /// Noise, motion, and what the data cannot determine: each looked at again once the model fits.
 ParameterUncertainty settle(Arrival& arrival, const FitProblem& problem, bool steps) {
   refine(arrival, problem);
+  if (steps && problem.effects.empty()) look_elsewhere(arrival);
   if (steps) settle_steps(arrival);
   ParameterUncertainty uncertainty = estimate_uncertainty(arrival.joint);
   constexpr int rounds = 4;  // what was a line of the noise may turn out to be nothing at all once its damping is held
