@@ -352,7 +352,7 @@ void look_elsewhere(Arrival& arrival) {
   const JointProblem& joint = arrival.joint;
   const bool explained = std::all_of(joint.runs().begin(), joint.runs().end(), [&, r = std::size_t{0}](const RunResidual& run) mutable {
     const auto freedom = static_cast<double>(run.degrees_of_freedom());
-    constexpr double chance = 5;
+    constexpr double chance = 2;  // standard deviations: what it costs is a fit of twice the time
     return run.evaluate(joint.theta(r++), Partials::none).chi2 < freedom * (1 + chance * std::sqrt(2 / freedom));
   });
   if (explained) return;
