@@ -92,7 +92,7 @@ GaussNewton gauss_newton(const LeastSquaresProblem& problem, const LeastSquaresP
 Standing standing(const LeastSquaresProblem& problem, const LeastSquaresPoint& point) {
   Standing s;
   s.next = gauss_newton(problem, point);
-  const double variance = variance_factor(problem, point.chi2());
+  const double variance = std::max(problem.least_variance, variance_factor(problem, point.chi2()));
   s.step_left = variance > 0 ? std::sqrt(s.next.promised / variance) : 0;
   constexpr double within_rounding = 100;  // ten times in length: a model rounds more than its values
   s.within_rounding = s.next.promised <= within_rounding * s.next.rounding;

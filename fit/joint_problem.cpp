@@ -52,6 +52,7 @@ VectorXd JointProblem::theta(std::size_t run) const {
 
 LeastSquaresProblem JointProblem::least_squares() const {
   LeastSquaresProblem problem;
+  problem.least_variance = 1;
   for (const Unknown& u : unknowns_) {
     const Parameter& p = parameter(u);
     problem.unknowns.push_back({name(u), u.value, p.lower, p.upper, u.held, 0});

@@ -35,6 +35,8 @@ struct LeastSquaresProblem {
   /// Of the data behind the residuals: (number of data) - (everything that was fitted). 0: residuals minus unknowns that are not held. It differs
   /// where residuals were compressed or unknowns eliminated.
   double degrees_of_freedom = 0;
+  /// Where the residuals are in units of a noise that is known: a standard error is not taken for less than that noise makes it, however small they are. Otherwise 0.
+  double least_variance = 0;
 
   Eigen::VectorXd values() const;
   Eigen::Index residuals() const;

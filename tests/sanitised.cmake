@@ -49,7 +49,8 @@ add_executable(sanitised_unrig ${PROJECT_SOURCE_DIR}/correct/main.cpp)
 target_link_libraries(sanitised_unrig PRIVATE sanitised_correct CLI11::CLI11)
 
 # The same tests, called sanitised.core.* and so on, but for what is left out, by name as --gtest_filter takes it.
-set(left_out Lengths.AMillionSamplesFitIntoASixthOfAGigabyte)  # memory under AddressSanitizer is another
+set(left_out Lengths.AMillionSamplesFitIntoASixthOfAGigabyte  # memory under AddressSanitizer is another
+  Fit.OfARecordWithoutNoiseConverges)  # its last steps are rounding, which is another too
 if(NOT UNRIG_SANITIZE STREQUAL "ALL")  # ten seconds and more each, half an hour some
   list(APPEND left_out Diagnose.* DecaysFirst.* DiagnosedRecordings.* Selection.TheFirstToBeFoundIsExchangedForWhatItStoodInFor Effects.GaugeLowpassIsRecovered
     Trial.NothingHiddenAndAWave Trial.WhatIsHiddenOutsideTheCandidatesCannotBeNamed OpenQuestion.AFitOfOneModeBendsItsParametersToIt
