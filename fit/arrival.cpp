@@ -349,6 +349,7 @@ Arrival arrive_with_effects(const FitProblem& problem, const Arrival& like, cons
 }
 
 void look_elsewhere(Arrival& arrival) {
+  if (arrival.model->rig().is_modal()) return;
   const JointProblem& joint = arrival.joint;
   const bool explained = std::all_of(joint.runs().begin(), joint.runs().end(), [&, r = std::size_t{0}](const RunResidual& run) mutable {
     const auto freedom = static_cast<double>(run.degrees_of_freedom());
@@ -356,21 +357,13 @@ void look_elsewhere(Arrival& arrival) {
     return run.evaluate(joint.theta(r++), Partials::none).chi2 < freedom * (1 + chance * std::sqrt(2 / freedom));
   });
   if (explained) return;
-  constexpr double clearly = 25;  // five standard deviations
-  for (const std::string name : {"torsion.stiffness_scale", "normal.stiffness_scale"})
-    for (const double factor : {1 / 1.5, 1.5}) {
-      Arrival other = arrival;
-      bool moved = false;
-      for (Unknown& u : other.joint.unknowns()) {
-        const Parameter& p = joint.parameter(u);
-        if (u.held || p.name != name) continue;
-        u.value = std::clamp(factor * u.value, p.lower, p.upper);
-        moved = true;
-      }
-      if (!moved) continue;
-      solve(other);
-      if (other.joint.chi2() < arrival.joint.chi2() - clearly * std::max(1.0, arrival.reduced_chi2())) arrival = std::move(other);
-    }
+  constexpr double clearly = 25, far = 1.5;  // five standard deviations; a factor of stiffness
+  for (const auto& [torsion, normal] : {std::pair{1 / far, 1.0}, {far, 1.0}, {1.0, 1 / far}, {1.0, far}}) {
+    Arrival other = arrival;
+    spread(other.joint, torsion, normal);
+    solve(other);
+    if (other.joint.chi2() < arrival.joint.chi2() - clearly * std::max(1.0, arrival.reduced_chi2())) arrival = std::move(other);
+  }
 }
 
 void refine(Arrival& arrival, const FitProblem& problem) {

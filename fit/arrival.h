@@ -46,7 +46,7 @@ void solve(Arrival& arrival, const JointProblem::SolveOptions& options = {});
 /// Noise levels from what the model leaves, spikes, and windows of the motion that the gauge asks to be wider; solves again after each.
 void refine(Arrival& arrival, const FitProblem& problem);
 
-/// Of a beam rig some of whose runs are left with more than chance leaves of their noise: once more from stiffnesses of torsion and of the normal modes a half lower and higher. One mode
+/// Of a beam rig some of whose runs are left with more than chance leaves of their noise: once more from stiffnesses of torsion and of the normal modes a third lower and a half higher. One mode
 /// may have taken a resonance of another, beside which its own is small.
 void look_elsewhere(Arrival& arrival);
 

@@ -209,9 +209,9 @@ double FittedRig::value(const std::string& name, const std::string& run_file, do
 
 Eigen::VectorXd theta_for(const AeroelasticModel& model, const FittedRig& fit, const std::string& run_file, double onset_angle) {
   const auto away = [&](const FittedParameter& p) {  // of the run that a parameter belongs to
-    const auto run = std::find(fit.runs.begin(), fit.runs.end(), p.run);
-    const double angle = run == fit.runs.end() ? onset_angle : fit.onset_angles[static_cast<std::size_t>(run - fit.runs.begin())];
-    return std::isfinite(angle - onset_angle) ? std::abs(angle - onset_angle) : 0;
+    const auto run = static_cast<std::size_t>(std::find(fit.runs.begin(), fit.runs.end(), p.run) - fit.runs.begin());
+    const double apart = run < fit.onset_angles.size() ? std::abs(fit.onset_angles[run] - onset_angle) : std::nan("");
+    return std::isfinite(apart) ? apart : 0;
   };
   Eigen::VectorXd theta = model.start_values();
   for (std::size_t j = 0; j < model.parameters().size(); ++j) {

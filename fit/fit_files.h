@@ -19,7 +19,7 @@ struct FittedRig {
   std::vector<FittedParameter> parameters;
   Eigen::MatrixXd correlation;
   std::vector<std::string> runs;
-  std::vector<double> onset_angles;  ///< rad, of the runs; not a number in a fit.json of an earlier version
+  std::vector<double> onset_angles;  ///< rad, of the runs; not a number in a fit.json of an earlier version, empty in a fit made in code
 
   /// The recording that the fit knows this file as, empty if it took no part: the same path or file; by its name, and the folders that agree, only where the fit's own file is no longer there.
   std::string recorded_as(const std::string& run_file) const;

@@ -7,6 +7,7 @@
 #include <nlohmann/json.hpp>
 
 #include "core/error.h"
+#include "tests/support/sample_data.h"
 #include "tests/support/temporary_directory.h"
 
 namespace unrig {
@@ -36,6 +37,21 @@ TEST(FitFiles, CarryTheStepsInWhichLawsWereFollowed) {
   json wrong = written(4);
   wrong["law_steps"] = 0;
   EXPECT_THROW(read_back(wrong), InputError);
+}
+
+TEST(FitFiles, ARunThatWasNotFittedTakesTheSlopeOfTheRunNearestInAngle) {
+  FitProblem problem;
+  problem.rig = read_rig(test::null_campaign("rig.toml"));
+  for (const char* name : {"step_a", "step_b", "step_c"}) problem.runs.push_back(read_run(test::null_campaign(std::string(name) + ".csv")));  // from 2.09, 4 and 25 deg
+  const AeroelasticModel model = model_of(problem.rig, problem.runs, problem.circulation, {});
+  FittedRig fitted = read_back(json::parse(to_json(fit(problem))));
+  const auto slope = [&](double degrees) { return theta_for(model, fitted, "another.csv", degrees * 3.14159265 / 180)[model.index("normal_force_slope")]; };
+  const auto own = [&](std::size_t run) { return fitted.value("normal_force_slope", problem.runs[run].file, 0); };
+  EXPECT_EQ(slope(2), own(0));
+  EXPECT_EQ(slope(5), own(1));
+  EXPECT_EQ(slope(22), own(2)) << "in stall";
+  fitted.onset_angles.clear();
+  EXPECT_NEAR(slope(22), (own(0) + own(1) + own(2)) / 3, 1e-12) << "of an earlier version";
 }
 
 TEST(FitFiles, ARecordingIsKnownByItsFileAndByItsNameOnlyWhereThatIsGone) {

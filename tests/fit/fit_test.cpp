@@ -88,7 +88,6 @@ TEST(Fit, OfTheCampaignWithoutHiddenEffectsFindsItsRig) {
   }
 }
 
-/// The lags of the circulation start anyhow too, and the slowest look like an offset of the gauge.
 /// A simulation of a planned step, to nine digits: chi-square is a ten-thousandth of the noise that those digits are, and its last steps are rounding.
 TEST(Fit, OfARecordWithoutNoiseConverges) {
   const Rig rig = read_rig(test::null_campaign("rig.toml"));
@@ -118,6 +117,7 @@ TEST(Fit, OfARecordWithoutNoiseConverges) {
   for (const auto& [name, value] : truth) EXPECT_NEAR(parameter(result, name).value, value, 1e-5 * value) << name;
 }
 
+/// The lags of the circulation start anyhow too, and the slowest look like an offset of the gauge.
 TEST(Fit, OfADecayInAStreamAndOneInAirFindsTheRig) {
   const Rig rig = read_rig(test::null_campaign("rig.toml"));
   const AeroelasticModel model(rig, make_basis(rig, 0.5 / 0.0005, 998.2), wagner(Wagner::within_1e6));
