@@ -51,18 +51,29 @@ DualMatrix without_dust(DualMatrix state) {
   return state;
 }
 
-DualMatrix to_the_block_length(DualMatrix transition) {
-  for (Index power = 1; power < block_length; power *= 2) transition = transition * transition;
-  return transition;
-}
+MatrixXd identity_like(const MatrixXd& m) { return MatrixXd::Identity(m.rows(), m.cols()); }
+DualMatrix identity_like(const DualMatrix& m) { return DualMatrix(MatrixXd(MatrixXd::Identity(m.rows(), m.cols())), m.parameters()); }
 
 }  // namespace
+
+template <class Matrix>
+Matrix power(Matrix m, Index exponent) {
+  Matrix product = identity_like(m);
+  bool one = true;
+  for (; exponent > 0; exponent /= 2) {
+    if (exponent % 2 == 1) product = one ? m : Matrix(product * m), one = false;
+    if (exponent > 1) m = Matrix(m * m);
+  }
+  return product;
+}
+template MatrixXd power(MatrixXd, Index);
+template DualMatrix power(DualMatrix, Index);
 
 FreeResponse::FreeResponse(const LinearSystem& system, const ExactStep& step, Partials partials) : channels_(system.C.rows()) {
   const bool with_partials = partials == Partials::all;
   transition_ = with_partials ? step.transition : without_partials(step.transition);
   observe_ = observation_block(with_partials ? system.C : without_partials(system.C), transition_);
-  leap_ = to_the_block_length(transition_);
+  leap_ = power(transition_, block_length);
   if (with_partials)
     for (Index j = 0; j < system.A.parameters(); ++j) acts_.push_back(acts(system, j));
 }
@@ -172,7 +183,7 @@ std::vector<MatrixXd> free_response_rows(const LinearSystem& system, const Exact
   const Index channels = system.C.rows(), n = system.states();
   const DualMatrix transition(step.transition.value);
   DualMatrix block = observation_block(DualMatrix(system.C.value), transition);
-  const DualMatrix leap = to_the_block_length(transition);
+  const DualMatrix leap = power(transition, block_length);
   std::vector<MatrixXd> rows(static_cast<std::size_t>(channels), MatrixXd(samples, n));
   for (Index first = 0; first < samples; first += block_length) {
     const Index count = std::min(block_length, samples - first);

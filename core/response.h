@@ -16,6 +16,10 @@ struct Response {
 /// Which partials to carry along: all of the system's, or none (a third of the cost).
 enum class Partials { none, all };
 
+/// m^exponent by repeated squaring, exponent 0 or more: of square matrices, with or without partials.
+template <class Matrix>
+Matrix power(Matrix m, Eigen::Index exponent);
+
 /// The free response of one system from any start: no jerk, no inputs. Cost per sample 2 n (K + n/32) (1 + 2 P) for n states, K channels, P parameters:
 /// outputs come in blocks from the state at the block's first sample.
 class FreeResponse {

@@ -79,6 +79,18 @@ VectorXd FourierPlan::inverse(const VectorXcd& lines) const {
   return Eigen::Map<const VectorXd>(buffers.real.get(), length_) / static_cast<double>(length_);
 }
 
+void FourierPlan::forward(const VectorXd& x, VectorXcd& lines) const {
+  if (x.size() != length_) throw std::invalid_argument(fmt::format("a transform of {} samples was asked for, of {} in place", length_, x.size()));
+  lines.resize(length_ / 2 + 1);
+  fftw_execute_dft_r2c(plans_->forward, const_cast<double*>(x.data()), reinterpret_cast<fftw_complex*>(lines.data()));  // which leaves its input as it is
+}
+
+void FourierPlan::inverse(VectorXcd& lines, VectorXd& x) const {
+  if (lines.size() != length_ / 2 + 1) throw std::invalid_argument(fmt::format("a record of {} samples has {} lines, not {}", length_, length_ / 2 + 1, lines.size()));
+  x.resize(length_);
+  fftw_execute_dft_c2r(plans_->inverse, reinterpret_cast<fftw_complex*>(lines.data()), x.data());
+}
+
 VectorXcd fourier(const VectorXd& x, Index length) { return FourierPlan(length == 0 ? x.size() : length).forward(x); }
 
 VectorXd window_weights(Window window, Index samples) {

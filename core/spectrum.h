@@ -25,6 +25,9 @@ class FourierPlan {
   Eigen::VectorXcd forward(const Eigen::VectorXd& x) const;  ///< with zeros behind x
   /// The record of `length` samples that has the lines 0 .. floor(length / 2), scaled so that it undoes `forward`. Throws std::invalid_argument where their number does not fit.
   Eigen::VectorXd inverse(const Eigen::VectorXcd& lines) const;
+  /// Both without a copy: `x` has `length` samples, `lines` becomes as long as it must; the inverse is not scaled and leaves nothing of the lines.
+  void forward(const Eigen::VectorXd& x, Eigen::VectorXcd& lines) const;
+  void inverse(Eigen::VectorXcd& lines, Eigen::VectorXd& x) const;
   Eigen::Index length() const { return length_; }
 
  private:

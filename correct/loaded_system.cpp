@@ -51,11 +51,19 @@ LinearSystem loaded_system(const AeroelasticModel& model, const Conditions& cond
   return system;
 }
 
+LinearSystem with_partials_of(LinearSystem system, const std::vector<Index>& parameters) {
+  for (DualMatrix* m : {&system.A, &system.B, &system.C, &system.D}) *m = only(*m, parameters);
+  return system;
+}
+
+ExactStep with_partials_of(ExactStep step, const std::vector<Index>& parameters) {
+  for (DualMatrix* m : {&step.transition, &step.jerk, &step.input0, &step.input1}) *m = only(*m, parameters);
+  return step;
+}
+
 Response spline_response(const LinearSystem& system, const ExactStep& step, Index samples, const std::vector<Index>& parameters) {
-  LinearSystem few = system;
-  for (DualMatrix* m : {&few.A, &few.B, &few.C, &few.D}) *m = only(*m, parameters);
-  ExactStep few_step = step;
-  for (DualMatrix* m : {&few_step.transition, &few_step.jerk, &few_step.input0, &few_step.input1}) *m = only(*m, parameters);
+  const LinearSystem few = with_partials_of(system, parameters);
+  const ExactStep few_step = with_partials_of(step, parameters);
   const Partials partials = parameters.empty() ? Partials::none : Partials::all;
   constexpr Index width = 4;  // samples in which a spline has a jerk
   const VectorXd jerk = (VectorXd(width) << 1, -3, 3, -1).finished() / (step.dt * step.dt * step.dt);

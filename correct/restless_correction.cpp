@@ -5,6 +5,7 @@
 #include <cmath>
 #include <complex>
 #include <numeric>
+#include <optional>
 #include <utility>
 #include <vector>
 
@@ -18,9 +19,7 @@ namespace {
 
 using Eigen::Index;
 using Eigen::MatrixXd;
-using Eigen::MatrixXf;
 using Eigen::RowVectorXd;
-using Eigen::VectorXcd;
 using Eigen::VectorXd;
 
 constexpr Index loads = 2;  ///< circulatory, normal force
@@ -47,78 +46,144 @@ Searched searched(const RestlessRun& run, const AeroelasticModel& model, const P
   return by;
 }
 
-/// The best theta with noise levels, roughness of the motion and weight of the regularisation learned on the way.
-Search estimate(RestlessRun& run, const AeroelasticModel& model, const Prior& prior, const VectorXd& start) {
+/// The first so many samples of a run.
+Run beginning_of(Run run, Index samples) {
+  for (Channel& channel : run.channels) channel.value.conservativeResize(samples);
+  return run;
+}
+
+/// How many samples are enough to begin a search with: as many as see the shaft move as the whole record does.
+Index enough_to_begin_with(const Run& run) {
+  constexpr Index few = 1 << 15;
+  constexpr double alike = 0.5;
+  const VectorXd& alpha = run.channel("alpha").value;
+  const auto scatter = [&](Index samples) {
+    double sum = 0, squares = 0, count = 0;
+    for (Index k = 0; k < samples; ++k)
+      if (std::isfinite(alpha[k])) sum += alpha[k] - alpha[0], squares += std::pow(alpha[k] - alpha[0], 2), count += 1;
+    return squares / count - std::pow(sum / count, 2);
+  };
+  Index samples = few;
+  while (2 * samples < run.samples() && !(scatter(samples) > alike * alike * scatter(run.samples()))) samples *= 2;
+  return 2 * samples < run.samples() ? samples : run.samples();
+}
+
+/// The best theta with noise levels, roughness of the motion and weight of the regularisation learned on the way: of a long record first on its beginning, so that all of it is gone
+/// through a few times only.
+Search estimate(RestlessRun& run, const AeroelasticModel& model, const RestlessProblem& problem) {
   constexpr double roughly = 10, well = 1e-2;  // of a chi-square whose own scatter is some hundreds
-  const Searched by = searched(run, model, prior);
-  const VectorXd theta = minimise(by, prior, start, roughly, false).solution.theta;
-  for (int round = 0; round < 2; ++round) {
-    run.settle_noise(theta);
-    run.settle_roughness(theta);
+  VectorXd theta = problem.start;
+  Prior prior = problem.prior;
+  const auto learn_noise = [&](RestlessRun& from, RestlessRun::Look look) {
+    from.settle_noise(theta);
+    from.settle_roughness(theta, look);
+  };
+  const Run first = beginning_of(problem.run, enough_to_begin_with(problem.run));
+  const bool in_parts = first.samples() < problem.run.samples();
+  std::optional<RestlessRun> beginning;
+  if (in_parts) beginning.emplace(model, first);
+  RestlessRun& part = in_parts ? *beginning : run;
+  theta = minimise(searched(part, model, prior), prior, theta, roughly, false).solution.theta;
+  learn_noise(part, RestlessRun::Look::everywhere);
+  if (in_parts) {
+    Search search = minimise(searched(part, model, prior), prior, theta, well, true);
+    theta = search.solution.theta;
+    prior.amplitude = search.prior.amplitude;
+    run.take_roughness_of(part);
+    beginning.reset();
   }
-  return minimise(by, prior, theta, well, true);
+  learn_noise(run, RestlessRun::Look::near);
+  return minimise(searched(run, model, prior), prior, theta, well, true);
 }
 
 /// How the readings and the loads move with z = (theta, linear unknowns), and what the smoother leaves of that.
 struct Slopes {
-  std::array<MatrixXf, loads> load;          ///< D, samples x z
-  std::array<VectorXd, loads> by_reading;    ///< of a reading that is too high by all of itself, for given z
+  std::vector<Index> at;                     ///< samples looked at
+  std::array<Eigen::MatrixXf, loads> load;   ///< D there, by z
+  std::array<VectorXd, loads> by_reading;    ///< there, of a reading that is too high by all of itself, for given z
   MatrixXd gauge_information, angle_information;  ///< what each noise shares of cov(z): e' e, e = what the smoother leaves over the noise
   VectorXd answer_to_reading;                ///< innovations of z times those of that reading
 };
 
-Slopes slopes_of(const RestlessRun& run, const RestlessRun::Point& point, const std::array<SettledSmoother::Quantity, loads>& load, double steady) {
+/// A load over the filter's states.
+RowVectorXd load_row(const RestlessRun& run, const RestlessRun::Point& point, Index load) { return run.row(point.system.C.value.row(run.outputs() + load)); }
+
+Slopes slopes_of(const RestlessRun& run, const RestlessRun::Point& point, double steady) {
   const Index n = run.samples(), channels = run.outputs() + 1, parameters = point.theta.size(), count = parameters + point.linear.size();
   const SettledSmoother& smoother = *point.smoother;
-  std::vector<SettledSmoother::Quantity> outputs;
-  for (Index c = 0; c < channels; ++c) outputs.push_back(smoother.quantity(smoother.filter().C.row(c)));
-  const SettledSmoother::Series own = smoother.series(point.left);
-  const VectorXcd motion = run.convolution().transform(run.motion(point, own));
-
-  // The reading as the model has it.
-  MatrixXd reading = MatrixXd::Zero(n, channels);
-  reading.col(0) = smoother.smoothed(outputs[0], own);
-  for (std::size_t j = 0; j < point.columns.size(); ++j) reading.col(0) += point.linear[static_cast<Index>(j)] * point.columns[j].col(0);
-  const SettledSmoother::Series of_reading = smoother.series(reading);
+  std::vector<SettledSmoother::Quantity> quantities;  // loads, then readings
+  for (Index l = 0; l < loads; ++l) quantities.push_back(smoother.quantity(load_row(run, point, l)));
+  for (Index c = 0; c < channels; ++c) quantities.push_back(smoother.quantity(smoother.filter().C.row(c)));
+  std::vector<const SettledSmoother::Quantity*> looked_at;
+  for (const SettledSmoother::Quantity& q : quantities) looked_at.push_back(&q);
 
   Slopes s;
-  for (std::size_t l = 0; l < loads; ++l) s.load[l].resize(n, count), s.by_reading[l] = smoother.smoothed(load[l], of_reading);
+  const auto [at, weight] = run.looked();
+  s.at = at;
+  const auto rows = static_cast<Index>(s.at.size());
+  const VectorXd root = weight.cwiseSqrt();
+  const VectorXd motion = run.motion(point);
+  MatrixXd white_reading;
+  {  // the reading as the model has it
+    MatrixXd reading = MatrixXd::Zero(n, channels);
+    reading.col(0) = smoother.smoothed({looked_at[loads]}, point.left, point.white);
+    for (Index j = 0; j < point.linear.size(); ++j) reading.col(0) += point.linear[j] * run.column(point, j).col(0);
+    SettledSmoother::Series of_reading = smoother.series(std::move(reading));
+    const MatrixXd by_reading = smoother.smoothed({looked_at[0], looked_at[1]}, of_reading.measured, of_reading.white, s.at);
+    for (std::size_t l = 0; l < loads; ++l) s.by_reading[l] = by_reading.col(static_cast<Index>(l));
+    white_reading = std::move(of_reading.white);
+  }
+
+  for (Eigen::MatrixXf& D : s.load) D.resize(rows, count);
   s.answer_to_reading.resize(count);
-  std::vector<MatrixXf> left(static_cast<std::size_t>(channels), MatrixXf(n, count));
-  const auto take = [&](Index j, const MatrixXd& y, const MatrixXd& direct) {
-    const SettledSmoother::Series series = smoother.series(y);
-    for (std::size_t l = 0; l < loads; ++l) s.load[l].col(j) = (direct.col(static_cast<Index>(l)) - smoother.smoothed(load[l], series)).cast<float>();
+  std::vector<Eigen::MatrixXf> left(static_cast<std::size_t>(channels), Eigen::MatrixXf(rows, count));
+  const auto take = [&](Index j, const SettledSmoother::Series& series, const MatrixXd& direct) {
+    const MatrixXd smoothed = smoother.smoothed(looked_at, series.measured, series.white, s.at);
+    for (Index l = 0; l < loads; ++l) s.load[static_cast<std::size_t>(l)].col(j) = (direct.col(l) - smoothed.col(l)).cast<float>();
     for (Index c = 0; c < channels; ++c)
-      left[static_cast<std::size_t>(c)].col(j) = ((y.col(c) - smoother.smoothed(outputs[static_cast<std::size_t>(c)], series)) / run.sigma()[c]).cast<float>();
-    s.answer_to_reading[j] = series.white.cwiseProduct(of_reading.white).sum();
+      left[static_cast<std::size_t>(c)].col(j) = ((series.measured.col(c)(s.at) - smoothed.col(loads + c)).cwiseProduct(root) / run.sigma()[c]).cast<float>();
+    s.answer_to_reading[j] = series.white.cwiseProduct(white_reading).sum();
   };
-  MatrixXd y = MatrixXd::Zero(n, channels);
-  run.slopes(point, motion, all_of(parameters), [&](Index j, const MatrixXd& slope) {
-    y.leftCols(run.outputs()) = slope.leftCols(run.outputs());
-    take(j, y, slope.rightCols(loads));
-  });
-  for (std::size_t j = 0; j < point.columns.size(); ++j) take(parameters + static_cast<Index>(j), point.columns[j], MatrixXd::Constant(n, loads, j == 0 ? steady : 0));
+  run.slopes(point, motion, all_of(parameters), s.at, [&](Index j, RestlessRun::Slope slope) { take(j, smoother.series(std::move(slope.readings)), slope.loads); });
+  for (Index j = 0; j < point.linear.size(); ++j) take(parameters + j, smoother.series(run.column(point, j)), MatrixXd::Constant(rows, loads, j == 0 ? steady : 0));
 
   s.gauge_information = s.angle_information = MatrixXd::Zero(count, count);
   constexpr Index block = 4096;  // sums in double precision
   for (Index c = 0; c < channels; ++c)
-    for (Index first = 0; first < n; first += block) {
-      const MatrixXd rows = left[static_cast<std::size_t>(c)].middleRows(first, std::min(block, n - first)).cast<double>();
-      (c + 1 < channels ? s.gauge_information : s.angle_information).noalias() += rows.transpose() * rows;
+    for (Index first = 0; first < rows; first += block) {
+      const MatrixXd some = left[static_cast<std::size_t>(c)].middleRows(first, std::min(block, rows - first)).cast<double>();
+      (c + 1 < channels ? s.gauge_information : s.angle_information).noalias() += some.transpose() * some;
     }
   return s;
+}
+
+/// Values at some samples, at all of them: by the parabola through the nearest three, which meets `least` at worst.
+VectorXd between(const VectorXd& value, const std::vector<Index>& at, double least) {
+  VectorXd all(at.back() + 1);
+  const auto last = static_cast<Index>(at.size()) - 1;
+  if (last < 2 || last + 1 == all.size()) return value.cwiseMax(least);
+  Index i = 1;
+  for (Index k = 0; k < all.size(); ++k) {
+    while (i + 1 < last && 2 * k > at[static_cast<std::size_t>(i)] + at[static_cast<std::size_t>(i) + 1]) ++i;
+    const auto x = [&](Index j) { return static_cast<double>(at[static_cast<std::size_t>(j)]); };
+    const double t = static_cast<double>(k), a = x(i - 1), b = x(i), c = x(i + 1);
+    all[k] = std::max(least, value[i - 1] * (t - b) * (t - c) / ((a - b) * (a - c)) + value[i] * (t - a) * (t - c) / ((b - a) * (b - c)) + value[i + 1] * (t - a) * (t - b) / ((c - a) * (c - b)));
+  }
+  return all;
 }
 
 /// Covariance of the errors of neighbouring samples over their variance, far from the ends and for given z: the error's spectrum is |l|^2 / (|g|^2 / r + |a|^2 / r_a + |1 - e^-iw|^8 / tau^2), with
 /// l, g and a what a spline does to the load, the readings and the angle.
 double neighbours_alike(const RestlessRun& run, const RestlessRun::Point& point, Index load) {
-  const Index n = run.samples(), outputs = run.outputs();
-  const Convolution& convolution = run.convolution();
-  const Response spline = spline_response(point.system, exact_step(point.system, run.dt()), n, {});
+  const Index outputs = run.outputs();
+  const Convolution& convolution = point.smoother->convolution();
+  const VectorXd none = VectorXd::Zero(convolution.far());  // what is left of a spline behind that is the same for neighbours
+  const Response spline = spline_response(point.system, exact_step(point.system, run.dt()), convolution.near(), {});
+  const auto power_of = [&](Index output) -> VectorXd { return convolution.kernel(spline.output.col(output), none).fine.cwiseAbs2(); };
   const double tau = run.roughness() * run.sigma()[outputs];
-  VectorXd power = convolution.transform(spline.output.col(outputs + load)).cwiseAbs2(), beside(power.size());
+  VectorXd power = power_of(outputs + load), beside(power.size());
   VectorXd information = VectorXd::Zero(power.size());
-  for (Index c = 0; c < outputs; ++c) information += convolution.transform(spline.output.col(c)).cwiseAbs2() / std::pow(run.sigma()[c], 2);
+  for (Index c = 0; c < outputs; ++c) information += power_of(c) / std::pow(run.sigma()[c], 2);
   for (Index k = 0; k < power.size(); ++k) {
     const double w = 2 * std::acos(-1.0) * static_cast<double>(k) / static_cast<double>(convolution.length());
     const double angle = (4 + 2 * std::cos(w)) / 6;
@@ -131,13 +196,12 @@ double neighbours_alike(const RestlessRun& run, const RestlessRun::Point& point,
 /// By how much the motion's variance of w is larger around each sample than in the whole record: 1 where it is not clearly so. What the roughness of the motion leaves open of the load
 /// goes with it, since the smoother's error is linear in w. From the smoothed w, differences of the jerk, over blocks of `block` samples, in which some three numbers are determined, each as
 /// wide as the wider of its neighbours: a shaft that sets out is rougher than one that swings.
-VectorXd rougher_than_the_record(const RestlessRun& run, const RestlessRun::Point& point, const SettledSmoother::Series& own) {
+VectorXd rougher_than_the_record(const VectorXd& jerk) {
   constexpr Index block = 50;
   constexpr double clearly = 3;
-  const Index n = run.samples(), states = point.smoother->filter().P.rows(), blocks = (n - 1) / block;
+  const Index n = jerk.size(), blocks = (n - 1) / block;
   VectorXd rougher = VectorXd::Ones(n);
   if (blocks < 3) return rougher;
-  const VectorXd jerk = point.smoother->smoothed(point.smoother->quantity(RowVectorXd::Unit(states, states - 1)), own);
   const VectorXd squares = (jerk.tail(n - 1) - jerk.head(n - 1)).cwiseAbs2();
   const double whole = squares.mean();
   VectorXd local(blocks);
@@ -150,50 +214,54 @@ VectorXd rougher_than_the_record(const RestlessRun& run, const RestlessRun::Poin
 }
 
 /// Standard deviations of a load, by sources.
-CorrectedLoad with_bands(const RestlessRun& run, const RestlessRun::Point& point, const SettledSmoother::Quantity& quantity, Index load, const VectorXd& rougher, const MatrixXf& D,
-                         const VectorXd& by_reading, const UncertaintyBudget& budget, double calibration, double inflation) {
-  const Index n = run.samples(), channels = run.outputs() + 1;
-  const VectorXd passed = point.smoother->passed_on(quantity).cwiseProduct(run.sigma().cwiseAbs2());
-  const double middle = quantity.variance[n / 2], angle = std::clamp(passed[channels - 1] / middle, 0.0, 1.0), gauge = std::clamp(passed.head(channels - 1).sum() / middle, 0.0, 1.0 - angle);
+void set_bands(const RestlessRun& run, const RestlessRun::Point& point, Index load, const VectorXd& rougher, const Slopes& slopes, const UncertaintyBudget& budget, double calibration, double inflation,
+               CorrectedLoad& result) {
+  const RowVectorXd over_states = load_row(run, point, load);
+  const Eigen::MatrixXf& D = slopes.load[static_cast<std::size_t>(load)];
+  const VectorXd& by_reading = slopes.by_reading[static_cast<std::size_t>(load)];
+  const Index n = run.samples(), channels = run.outputs() + 1, looked_at = static_cast<Index>(slopes.at.size());
+  const VectorXd passed = point.smoother->passed_on(point.smoother->quantity(over_states)).cwiseProduct(run.sigma().cwiseAbs2()), variance = point.smoother->variance(over_states);
+  const double middle = variance[n / 2], angle = std::clamp(passed[channels - 1] / middle, 0.0, 1.0), gauge = std::clamp(passed.head(channels - 1).sum() / middle, 0.0, 1.0 - angle);
   std::array<double, static_cast<std::size_t>(sources)> share{};
   share[static_cast<std::size_t>(Source::gauge)] = gauge * inflation * inflation;
   share[static_cast<std::size_t>(Source::angle)] = angle * inflation * inflation;
   share[static_cast<std::size_t>(Source::regularisation)] = 1 - gauge - angle;
+  const auto of_motion = [&](Index source, Index k) {
+    const double by_size = share[static_cast<std::size_t>(source)] * std::max(0.0, variance[k]);
+    return static_cast<Source>(source) == Source::regularisation ? by_size * rougher[k] : by_size;
+  };
   const double alike = neighbours_alike(run, point, load);
 
-  CorrectedLoad result;
-  result.std.resize(n);
-  result.by_source.resize(n, sources);
+  MatrixXd of_z(looked_at, sources);  // variances
   double length = 0, before_std = 0;
   RowVectorXd before;
   constexpr Index block = 1024;
-  for (Index first = 0; first < n; first += block) {
-    const Index count = std::min(block, n - first);
+  for (Index first = 0; first < looked_at; first += block) {
+    const Index count = std::min(block, looked_at - first);
     MatrixXd rows = D.middleRows(first, count).cast<double>() * budget.root();
     rows.col(budget.first_column(Source::calibration)) += calibration * by_reading.segment(first, count);
-    const VectorXd variance = quantity.variance.segment(first, count).cwiseMax(0);
-    VectorXd motion = VectorXd::Zero(count);  // variance for given z
-    for (Index s = 0; s < sources; ++s) {
-      const auto source = static_cast<Source>(s);
-      const VectorXd of_z = rows.middleCols(budget.first_column(source), budget.columns(source)).rowwise().squaredNorm();
-      VectorXd of_motion = share[static_cast<std::size_t>(s)] * variance;
-      if (source == Source::regularisation) of_motion = of_motion.cwiseProduct(rougher.segment(first, count)).eval();
-      result.by_source.col(s).segment(first, count) = (of_z + of_motion).cwiseSqrt();
-      motion += of_motion;
-    }
-    result.std.segment(first, count) = result.by_source.middleRows(first, count).rowwise().norm();
-    for (Index k = 0; k < count; ++k) {  // the angle between neighbours, from the chord
-      const double std = result.std[first + k];
+    for (Index s = 0; s < sources; ++s) of_z.col(s).segment(first, count) = rows.middleCols(budget.first_column(static_cast<Source>(s)), budget.columns(static_cast<Source>(s))).rowwise().squaredNorm();
+    for (Index i = 0; i < count; ++i) {  // the angle between neighbours, from the chord
+      const Index k = slopes.at[static_cast<std::size_t>(first + i)];
+      double motion = 0;
+      for (Index s = 0; s < sources; ++s) motion += of_motion(s, k);
+      const double std = std::sqrt(of_z.row(first + i).sum() + motion);
       if (before.size() > 0 && std > 0 && before_std > 0) {
-        const double off = (rows.row(k) / std - before / before_std).squaredNorm() + motion[k] * (std::pow(1 / std - 1 / before_std, 2) + 2 * (1 - alike) / (std * before_std));
-        length += 2 * std::asin(std::min(1.0, std::sqrt(off) / 2));
+        const auto apart = static_cast<double>(k - slopes.at[static_cast<std::size_t>(first + i - 1)]);
+        const double off = ((rows.row(i) / std - before / before_std).squaredNorm() + motion * std::pow(1 / std - 1 / before_std, 2)) / (apart * apart) + 2 * motion * (1 - alike) / (std * before_std);
+        length += apart * 2 * std::asin(std::min(1.0, std::sqrt(off) / 2));
       }
-      before = rows.row(k);
+      before = rows.row(i);
       before_std = std;
     }
   }
+  result.by_source.resize(n, sources);
+  for (Index s = 0; s < sources; ++s) {
+    result.by_source.col(s) = between(of_z.col(s), slopes.at, 0);
+    for (Index k = 0; k < n; ++k) result.by_source(k, s) = std::sqrt(result.by_source(k, s) + of_motion(s, k));
+  }
+  result.std = result.by_source.rowwise().norm();
   result.simultaneous = simultaneous_factor_of_length(length);
-  return result;
 }
 
 /// What the user should know before trusting the bands.
@@ -245,7 +313,7 @@ void vary_weight(const Search& best, const RunResidual::Evaluation& e, const Slo
     const Eigen::VectorXf narrow = move.cast<float>();
     for (std::size_t l = 0; l < loads; ++l) {
       CorrectedLoad& load = l == 0 ? result.circulatory : result.normal_force;
-      (half ? load.half_weight : load.twice_weight) = load.value + (slopes.load[l] * narrow).cast<double>();
+      (half ? load.half_weight : load.twice_weight) = load.value + between((slopes.load[l] * narrow).cast<double>(), slopes.at, -INFINITY);
     }
     (half ? result.indicial.half_weight : result.indicial.twice_weight) = indicial_values(model, theta + of_theta, result.indicial.semichords);
   }
@@ -259,12 +327,29 @@ void describe_motion(const RestlessRun& run, const VectorXd& angle, CorrectResul
   result.step = angle[angle.size() - 1];
 }
 
+/// What the smoother finds: both loads, what is left of the gauge's readings, and the motion, whose jerk it returns.
+VectorXd smoothed_run(const RestlessRun& run, const RestlessRun::Point& point, double steady, CorrectResult& result) {
+  const SettledSmoother& smoother = *point.smoother;
+  const Index states = smoother.filter().P.rows();
+  std::vector<SettledSmoother::Quantity> quantities;
+  for (const RowVectorXd& row : {load_row(run, point, 0), load_row(run, point, 1), RowVectorXd(smoother.filter().C.row(0)), RowVectorXd(smoother.filter().C.row(run.outputs())), RowVectorXd(RowVectorXd::Unit(states, states - 1))})
+    quantities.push_back(smoother.quantity(row));
+  std::vector<const SettledSmoother::Quantity*> all;
+  for (const SettledSmoother::Quantity& q : quantities) all.push_back(&q);
+  const MatrixXd found = smoother.smoothed(all, point.left, point.white);
+  result.circulatory.value = found.col(0).array() + steady * point.linear[0];
+  result.normal_force.value = found.col(1).array() + steady * point.linear[0];
+  result.unexplained = point.left.col(0) - found.col(2);
+  describe_motion(run, found.col(3), result);
+  return found.col(4);
+}
+
 }  // namespace
 
 void correct_restless(const RestlessProblem& problem, CorrectResult& result) {
   const AeroelasticModel& model = problem.model;
   RestlessRun run(model, problem.run);
-  const Search free = estimate(run, model, problem.prior, problem.start);
+  const Search free = estimate(run, model, problem);
   Search best = free;
   if (problem.imposed.any()) {
     constexpr double well = 1e-2;
@@ -280,14 +365,11 @@ void correct_restless(const RestlessProblem& problem, CorrectResult& result) {
     std::optional<UncertaintyBudget> budget;
     double inflation = 1;
   };
-  const auto load_quantities = [&](const RestlessRun::Point& point) {
-    return std::array<SettledSmoother::Quantity, loads>{point.smoother->quantity(run.row(point.system.C.value.row(run.outputs()))), point.smoother->quantity(run.row(point.system.C.value.row(run.outputs() + 1)))};
-  };
   const auto look = [&](const Search& search) {
     Looked looked;
-    looked.e = run.differentiate(search.solution, all_of(theta.size()));
+    looked.e = search.prior.held.empty() ? search.evaluation : run.differentiate(search.solution, all_of(theta.size()));
     const RestlessRun::Point& point = run.at(search.solution.theta);
-    looked.slopes = slopes_of(run, point, load_quantities(point), problem.steady_per_reading);
+    looked.slopes = slopes_of(run, point, problem.steady_per_reading);
     result.reduced_chi2 = looked.e.chi2 / static_cast<double>(run.observations() - static_cast<Index>(search.prior.free.size()) - point.linear.size());
     looked.inflation = std::sqrt(std::max(1.0, result.reduced_chi2));
     const auto shares = [&](const MatrixXd& F, const MatrixXd& priors) -> UncertaintyBudget::Shares {
@@ -305,19 +387,12 @@ void correct_restless(const RestlessProblem& problem, CorrectResult& result) {
   result.indicial = indicial_response(model, theta, *looked.budget, problem.semichords, result.semichords_per_second);
   if (problem.imposed.any()) result.indicial.take_tests_of(tests);
 
-  const SettledSmoother::Series own = point.smoother->series(point.left);
-  const VectorXd rougher = rougher_than_the_record(run, point, own);
-  const std::array<SettledSmoother::Quantity, loads> quantities = load_quantities(point);
-  for (std::size_t l = 0; l < loads; ++l) {
-    CorrectedLoad& load = l == 0 ? result.circulatory : result.normal_force;
-    load = with_bands(run, point, quantities[l], static_cast<Index>(l), rougher, looked.slopes.load[l], looked.slopes.by_reading[l], *looked.budget, result.calibration_uncertainty, looked.inflation);
-    load.value = point.smoother->smoothed(quantities[l], own).array() + problem.steady_per_reading * point.linear[0];
-  }
+  const VectorXd rougher = rougher_than_the_record(smoothed_run(run, point, problem.steady_per_reading, result));
+  warn(run, point, result.reduced_chi2, result.start, result);
+  run.forget_readings();
+  for (Index l = 0; l < loads; ++l) set_bands(run, point, l, rougher, looked.slopes, *looked.budget, result.calibration_uncertainty, looked.inflation, l == 0 ? result.circulatory : result.normal_force);
   vary_weight(best, looked.e, looked.slopes, model, result);
 
-  const RowVectorXd gauge = point.smoother->filter().C.row(0), angle = point.smoother->filter().C.row(run.outputs());
-  result.unexplained = point.left.col(0) - point.smoother->smoothed(point.smoother->quantity(gauge), own);
-  describe_motion(run, point.smoother->smoothed(point.smoother->quantity(angle), own), result);
   result.noise = run.sigma()[0];
   const Index slope = model.index("normal_force_slope");
   result.slope = theta[slope];
@@ -326,7 +401,6 @@ void correct_restless(const RestlessProblem& problem, CorrectResult& result) {
   result.determined = best.determined;
   result.amplitudes = static_cast<Index>(best.prior.amplitudes.size());
   result.in_fit = !best.prior.held.empty();
-  warn(run, point, result.reduced_chi2, result.start, result);
 }
 
 }  // namespace unrig

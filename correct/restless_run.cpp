@@ -4,10 +4,13 @@
 #include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
+#include <iterator>
+#include <map>
 
 #include <fmt/format.h>
 
 #include "core/error.h"
+#include "core/in_parallel.h"
 #include "core/motion.h"
 #include "core/run_inputs.h"
 
@@ -26,14 +29,57 @@ MatrixXd triangle_of(MatrixXd rows) {
 }
 
 /// Samples x channels as one column.
-VectorXd flat(const MatrixXd& a) { return a.reshaped(); }
+auto flat(const MatrixXd& a) { return Eigen::Map<const VectorXd>(a.data(), a.size()); }
+
+bool knows(const MatrixXd& R, Index j) {
+  constexpr double nothing = 1e-13;
+  return std::abs(R(j, j)) > nothing * R.col(j).head(j + 1).norm();
+}
+
+/// x with R' x = g; zero where R knows nothing of it.
+VectorXd solve_below(const MatrixXd& R, VectorXd g) {
+  for (Index j = 0; j < g.size(); ++j) g[j] = knows(R, j) ? (g[j] - R.col(j).head(j).dot(g.head(j))) / R(j, j) : 0;
+  return g;
+}
+
+/// x with R x = y; zero where R knows nothing of it.
+VectorXd solve_above(const MatrixXd& R, VectorXd y) {
+  for (Index j = y.size() - 1; j >= 0; --j) {
+    y[j] = knows(R, j) ? y[j] / R(j, j) : 0;
+    y.head(j) -= y[j] * R.col(j).head(j);
+  }
+  return y;
+}
+
+/// What a unit spline does to all outputs, by parameter, as a Convolution wants to know it; empty where a parameter does not act.
+struct SplineKernels {
+  std::vector<MatrixXd> near, far;
+};
+
+SplineKernels spline_kernels(const LinearSystem& system, const ExactStep& step, const ExactStep& stride, const Convolution& convolution, const std::vector<Index>& parameters) {
+  if (convolution.far() == 0) {
+    std::vector<MatrixXd> near = spline_response(system, step, convolution.near(), parameters).partial;
+    std::vector<MatrixXd> none(near.size(), MatrixXd(0, system.C.rows()));
+    return {std::move(near), std::move(none)};
+  }
+  const LinearSystem few = with_partials_of(system, parameters);
+  const Response first = spline_response(system, step, convolution.half(), parameters);
+  const Response second = FreeResponse(few, with_partials_of(step, parameters), Partials::all).from(first.end, convolution.near() - convolution.half());
+  SplineKernels kernels{first.partial, FreeResponse(few, with_partials_of(stride, parameters), Partials::all).from(first.end, convolution.far()).partial};
+  for (std::size_t j = 0; j < kernels.near.size(); ++j) {
+    if (first.partial[j].size() == 0) continue;
+    kernels.near[j].resize(convolution.near(), system.C.rows());
+    kernels.near[j] << first.partial[j], second.partial[j];
+  }
+  return kernels;
+}
 
 VectorXd masked(const VectorXd& x, const Eigen::Matrix<bool, Eigen::Dynamic, 1>& missing) { return missing.select(VectorXd::Constant(x.size(), std::nan("")), x); }
 
 }  // namespace
 
-RestlessRun::RestlessRun(const AeroelasticModel& model, const Run& run)
-    : model_(&model), run_(&run), conditions_(conditions_of(run)), channels_(model.output_channels(run)), convolution_(run.samples()) {
+RestlessRun::RestlessRun(const AeroelasticModel& model, const Run& run, Index in_one_piece)
+    : model_(&model), run_(&run), conditions_(conditions_of(run)), in_one_piece_(in_one_piece), channels_(model.output_channels(run)) {
   const Index n = run.samples(), channels = outputs() + 1;
   const LinearSystem system = loaded_system(model, conditions_, model.start_values(), channels_);
   exogenous_ = system.exogenous;
@@ -100,41 +146,79 @@ std::shared_ptr<RestlessRun::Point> RestlessRun::point_at(const VectorXd& theta)
   for (Index c = 0; c < outputs(); ++c) C.row(c) = row(system.C.value.row(c));
   C.row(channels - 1) = row(RowVectorXd::Unit(system.states(), motion_state_));
   const VectorXd b = tau / cube * F.rightCols(1);
-  point->smoother.emplace(settle(F, b, C, sigma_.cwiseAbs2()), convolution_);
+  SettledFilter filter = settle(F, b, C, sigma_.cwiseAbs2());
+  const std::shared_ptr<const Convolution> convolution = convolution_for(filter.L, system);
+  point->smoother.emplace(std::move(filter), convolution);
   point->log_determinant = point->smoother->filter().log_determinant;
 
   // What else reaches the readings: offsets, the level of the angle, signals from any start; and the measured inputs.
-  for (Index c = 0; c < channels; ++c) {
-    point->columns.emplace_back(MatrixXd::Zero(n, channels));
-    point->columns.back().col(c).setOnes();
-  }
   for (const Index i : exogenous_) {
-    point->columns.emplace_back(MatrixXd::Zero(n, channels));
-    point->columns.back().leftCols(outputs()) = coast(system, step, DualMatrix(MatrixXd(VectorXd::Unit(system.states(), i))), n, Partials::none).output.leftCols(outputs());
+    point->signals.emplace_back(MatrixXd::Zero(n, channels));
+    point->signals.back().leftCols(outputs()) = coast(system, step, DualMatrix(MatrixXd(VectorXd::Unit(system.states(), i))), n, Partials::none).output.leftCols(outputs());
   }
-  MatrixXd y = measured_;
-  if (inputs_.cols() > 0) y.leftCols(outputs()) -= drive(system, step, DualMatrix(MatrixXd::Zero(system.states(), 1)), n, {}, inputs_, Partials::none).output.leftCols(outputs());
-  point->white_columns.resize(n * channels, static_cast<Index>(point->columns.size()));
-  for (std::size_t j = 0; j < point->columns.size(); ++j) point->white_columns.col(static_cast<Index>(j)) = flat(point->smoother->innovations(point->columns[j]));
-  const MatrixXd white = point->smoother->innovations(y);
-  point->linear = point->white_columns.colPivHouseholderQr().solve(flat(white));
-  point->left = y;
-  for (std::size_t j = 0; j < point->columns.size(); ++j) point->left -= point->linear[static_cast<Index>(j)] * point->columns[j];
-  point->white = (flat(white) - point->white_columns * point->linear).reshaped(n, channels);
+  const Index unknowns = channels + static_cast<Index>(exogenous_.size());
+  point->left = measured_;
+  if (inputs_.cols() > 0) point->left.leftCols(outputs()) -= drive(system, step, DualMatrix(MatrixXd::Zero(system.states(), 1)), n, {}, inputs_, Partials::none).output.leftCols(outputs());
+  MatrixXd rows(n * channels, unknowns + 1);
+  for (Index j = 0; j < unknowns; ++j) rows.col(j) = flat(point->smoother->innovations(column(*point, j)));
+  point->white = point->smoother->innovations(point->left);
+  rows.rightCols(1) = flat(point->white);
+  point->white_columns = rows.leftCols(unknowns);
+  const MatrixXd triangle = triangle_of(std::move(rows));
+  point->linear_factor = triangle.topLeftCorner(unknowns, unknowns);
+  point->linear = triangle.leftCols(unknowns).colPivHouseholderQr().solve(triangle.rightCols(1)).col(0);
+  for (Index j = 0; j < unknowns; ++j) point->left -= point->linear[j] * column(*point, j);
+  Eigen::Map<VectorXd>(point->white.data(), point->white.size()) -= point->white_columns * point->linear;
   point->chi2 = point->white.squaredNorm();
   return point;
 }
 
+MatrixXd RestlessRun::column(const Point& point, Index j) const {
+  const Index channels = outputs() + 1;
+  if (j >= channels) return point.signals[static_cast<std::size_t>(j - channels)];
+  MatrixXd offset = MatrixXd::Zero(samples(), channels);
+  offset.col(j).setOnes();
+  return offset;
+}
+
+std::vector<Index> RestlessRun::driven_states() const {
+  std::vector<Index> driven;
+  for (const Index i : kept_)
+    if (i < motion_state_ || i > motion_state_ + 2) driven.push_back(i);
+  return driven;
+}
+
+std::shared_ptr<const Convolution> RestlessRun::convolution_for(const MatrixXd& L, const LinearSystem& system) const {
+  Index near = 0;
+  if (samples() > in_one_piece_) {
+    const std::vector<Index> driven = driven_states();
+    const VectorXcd of_rig = (MatrixXd(system.A.value(driven, driven)).eigenvalues() * run_->dt).array().exp(), of_filter = L.eigenvalues();
+    VectorXcd both(of_rig.size() + of_filter.size());
+    both << of_rig, of_filter;
+    near = near_samples(both, samples());
+  }
+  if (!convolution_ || convolution_->near() != (near > 0 ? near : samples())) convolution_ = std::make_shared<const Convolution>(samples(), near);
+  return convolution_;
+}
+
 const RestlessRun::Point& RestlessRun::at(const VectorXd& theta) const {
-  if (!last_ || last_->theta != theta) last_ = point_at(theta);
+  if (!last_ || last_->theta != theta) {
+    last_.reset();
+    last_ = point_at(theta);
+  }
   return *last_;
+}
+
+void RestlessRun::forget_readings() {
+  measured_.resize(0, 0), inputs_.resize(0, 0), missing_.resize(0, 0);
+  if (!last_) return;
+  last_->signals.clear();
+  for (MatrixXd* m : {&last_->white_columns, &last_->left, &last_->white}) m->resize(0, 0);
 }
 
 double RestlessRun::growth(const VectorXd& theta) const {
   const LinearSystem system = loaded_system(*model_, conditions_, theta, channels_);
-  std::vector<Index> own;  // the shaft's position, velocity and acceleration are driven from outside
-  for (const Index i : kept_)
-    if (i < motion_state_ || i > motion_state_ + 2) own.push_back(i);
+  const std::vector<Index> own = driven_states();  // the shaft's position, velocity and acceleration are driven from outside
   if (!system.A.value.allFinite()) return INFINITY;
   return MatrixXd(system.A.value(own, own)).eigenvalues().real().maxCoeff() * run_->dt * static_cast<double>(samples());
 }
@@ -147,83 +231,118 @@ RunResidual::Solution RestlessRun::solve(const VectorXd& theta) const {
   return {theta, point.chi2, point.linear, nullptr};
 }
 
-VectorXd RestlessRun::motion(const Point& point, const SettledSmoother::Series& series) const {
+VectorXd RestlessRun::motion(const Point& point) const {
   const Index n = samples();
   const double h = run_->dt;
   // At sample k the spline has c_(k-2) = p - h^2 p''/6 and c_(k-1) = p + h p' + h^2 p''/3.
   RowVectorXd inner = RowVectorXd::Zero(point.system.states()), last = inner;
   inner.segment(motion_state_, 3) << 1, 0, -h * h / 6;
   last.segment(motion_state_, 3) << 1, h, h * h / 3;
-  const VectorXd found = point.smoother->smoothed(point.smoother->quantity(row(inner)), series);
+  const SettledSmoother::Quantity of_inner = point.smoother->quantity(row(inner)), of_last = point.smoother->quantity(row(last));
+  const MatrixXd found = point.smoother->smoothed({&of_inner, &of_last}, point.left, point.white);
   VectorXd c = VectorXd::Zero(n);
-  c.head(n - 2) = found.tail(n - 2);
-  c[n - 2] = point.smoother->smoothed(point.smoother->quantity(row(last)), series)[n - 1];
-  c.head(n - 1).array() -= found[1];
+  c.head(n - 2) = found.col(0).tail(n - 2);
+  c[n - 2] = found(n - 1, 1);
+  c.head(n - 1).array() -= found(1, 0);
   return c;
 }
 
-void RestlessRun::slopes(const Point& point, const VectorXcd& motion, const std::vector<Index>& parameters, const std::function<void(Index, const MatrixXd&)>& take) const {
+void RestlessRun::slopes(const Point& point, const VectorXd& motion, const std::vector<Index>& parameters, const std::vector<Index>& at, const std::function<void(Index, Slope)>& take) const {
   const LinearSystem system = loaded_system(*model_, conditions_, point.theta, channels_);
   const ExactStep step = exact_step(system, run_->dt);
-  constexpr std::size_t at_once = 3;  // responses to a spline in memory
-  for (std::size_t first = 0; first < parameters.size(); first += at_once) {
-    const std::size_t last = std::min(parameters.size(), first + at_once);
+  const Convolution& convolution = point.smoother->convolution();
+  ExactStep stride = step;
+  if (convolution.far() > 0) stride.transition = power(step.transition, convolution.stride());
+  constexpr std::size_t at_once = 2;  // responses to a spline in memory
+  in_parallel((parameters.size() + at_once - 1) / at_once, [&](std::size_t group) {
+    const std::size_t first = group * at_once, last = std::min(parameters.size(), first + at_once);
     const std::vector<Index> few(parameters.begin() + static_cast<std::ptrdiff_t>(first), parameters.begin() + static_cast<std::ptrdiff_t>(last));
-    Response response = spline_response(system, step, samples(), few);
-    for (std::size_t j = first; j < last; ++j) {
-      MatrixXd& kernel = response.partial[static_cast<std::size_t>(parameters[j])];
-      if (kernel.size() == 0) kernel = MatrixXd::Zero(samples(), system.C.rows());
-      if (!kernel.allFinite())
+    const SplineKernels kernels = spline_kernels(system, step, stride, convolution, few);
+    for (std::size_t j = 0; j < few.size(); ++j) {
+      const auto parameter = static_cast<std::size_t>(few[j]);
+      const MatrixXd &near = kernels.near[parameter], &far = kernels.far[parameter];
+      if (!near.allFinite() || !far.allFinite())
         throw NoAnswer(fmt::format("{}: over so long a record ({} samples) the model's response to the shaft does not stay finite where the search has come to; correct the run in shorter parts", run_->file, samples()));
-      for (Index c = 0; c < kernel.cols(); ++c)
-        if (!kernel.col(c).isZero(0)) kernel.col(c) = convolution_.past(convolution_.transform(kernel.col(c)), motion);
-      take(static_cast<Index>(j), kernel);
-      kernel.resize(0, 0);
+      // Outputs [first, first + count) into as many of `columns` columns.
+      const auto outputs_of = [&](Index first_output, Index wanted, Index columns, const std::vector<Index>& where) {
+        std::vector<Convolution::Kernel> kernel;
+        std::vector<Convolution::Sum> sums;
+        kernel.reserve(static_cast<std::size_t>(wanted));
+        for (Index c = 0; c < wanted && near.size() > 0; ++c) {
+          if (near.col(first_output + c).isZero(0)) continue;
+          kernel.push_back(convolution.kernel(near.col(first_output + c), far.col(first_output + c)));
+          sums.push_back({&kernel.back(), motion.data(), Convolution::Direction::past, c});
+        }
+        return convolution.sums(sums, columns, where);
+      };
+      take(static_cast<Index>(first + j), {outputs_of(0, outputs(), outputs() + 1, {}), at.empty() ? MatrixXd() : outputs_of(outputs(), near.cols() - outputs(), near.cols() - outputs(), at)});
     }
-  }
+  });
+}
+
+RestlessRun::Looked RestlessRun::looked() const {
+  constexpr double radian = 1;
+  constexpr Index most = 16, end = 512;
+  const Index n = samples(), stride = n > in_one_piece_ ? std::clamp<Index>(static_cast<Index>(radian / std::pow(roughness_, 0.25)), 1, most) : 1;
+  Looked looked;
+  for (Index k = 0; k < n; k += k < end || k >= n - end ? 1 : std::min(stride, n - end - k)) looked.at.push_back(k);
+  const auto count = static_cast<Index>(looked.at.size());
+  looked.weight.resize(count);
+  const auto place = [&](Index i) { return static_cast<double>(looked.at[static_cast<std::size_t>(std::clamp<Index>(i, 0, count - 1))]); };
+  for (Index i = 0; i < count; ++i) looked.weight[i] = (place(i + 1) - place(i - 1)) / 2;
+  looked.weight[0] += 0.5, looked.weight[count - 1] += 0.5;
+  return looked;
 }
 
 RunResidual::Evaluation RestlessRun::differentiate(const RunResidual::Solution& solution, const std::vector<Index>& parameters) const {
   const Point& point = at(solution.theta);
-  const Index n = samples(), channels = outputs() + 1, unknowns = point.linear.size(), count = solution.theta.size();
-  const VectorXcd c = convolution_.transform(motion(point, point.smoother->series(point.left)));
-  MatrixXd rows(n * channels, static_cast<Index>(parameters.size()) + 1);
-  {
-    MatrixXd y = MatrixXd::Zero(n, channels);
-    slopes(point, c, parameters, [&](Index place, const MatrixXd& slope) {
-      y.leftCols(outputs()) = slope.leftCols(outputs());
-      rows.col(place) = -flat(point.smoother->innovations(y));
-    });
-  }
-  const auto own = rows.leftCols(rows.cols() - 1);
-  const Eigen::HouseholderQR<MatrixXd> reach(point.white_columns);
+  const Index channels = outputs() + 1, unknowns = point.linear.size(), count = solution.theta.size(), chosen = static_cast<Index>(parameters.size());
+  const Looked looked_at = looked();
+  const auto some = static_cast<Index>(looked_at.at.size());
+  const VectorXd root = looked_at.weight.cwiseSqrt();
   RunResidual::Evaluation e;
   e.chi2 = point.chi2;
   e.linear = point.linear;
-  e.linear_factor = reach.matrixQR().topRows(unknowns).triangularView<Eigen::Upper>();
-  const MatrixXd basis = reach.householderQ() * MatrixXd::Identity(n * channels, unknowns), along = basis.transpose() * own;
+  e.linear_factor = point.linear_factor;
+
+  // Innovations of the slopes beside what the linear unknowns reach: `rows` those looked at, `downhill` what they have in common with what is left of the readings.
+  MatrixXd rows(some * channels, chosen), along(unknowns, chosen);
+  VectorXd downhill(chosen);
+  slopes(point, motion(point), parameters, {}, [&](Index place, const Slope& slope) {
+    MatrixXd white = point.smoother->innovations(slope.readings);
+    Eigen::Map<VectorXd> all(white.data(), white.size());
+    const VectorXd reached = solve_above(e.linear_factor, solve_below(e.linear_factor, -point.white_columns.transpose() * all));
+    all = -all;
+    all.noalias() -= point.white_columns * reached;
+    along.col(place) = reached;
+    downhill[place] = all.dot(flat(point.white));
+    for (Index c = 0; c < channels; ++c) rows.col(place).segment(c * some, some) = root.cwiseProduct(white.col(c)(looked_at.at));
+  });
   e.linear_slope = MatrixXd::Zero(unknowns, count);
-  e.linear_slope(Eigen::all, parameters) = MatrixXd(e.linear_factor.triangularView<Eigen::Upper>().solve(along));
-  rows.leftCols(rows.cols() - 1).noalias() -= basis * along;
-  rows.rightCols(1) = flat(point.white);
+  e.linear_slope(Eigen::all, parameters) = along;
   const MatrixXd triangle = triangle_of(std::move(rows));
-  e.residual = triangle.rightCols(1);
-  e.jacobian = MatrixXd::Zero(triangle.rows(), count);
-  e.jacobian(Eigen::all, parameters) = triangle.leftCols(triangle.cols() - 1);
+  e.residual.resize(chosen + 1);
+  e.residual.head(chosen) = solve_below(triangle, downhill);
+  e.residual[chosen] = std::sqrt(std::max(0.0, e.chi2 - e.residual.head(chosen).squaredNorm()));
+  e.jacobian = MatrixXd::Zero(chosen + 1, count);
+  e.jacobian.topRows(chosen)(Eigen::all, parameters) = triangle;
   return e;
 }
 
 void RestlessRun::settle_noise(const VectorXd& theta) {
   const Point& point = at(theta);
-  const SettledSmoother::Series series = point.smoother->series(point.left);
   const Index n = samples(), channels = outputs() + 1, angle = channels - 1;
   const VectorXd sigma = sigma_;
+  std::vector<SettledSmoother::Quantity> read;
+  std::vector<const SettledSmoother::Quantity*> each;
+  for (Index c = 0; c < channels; ++c) read.push_back(point.smoother->quantity(point.smoother->filter().C.row(c)));
+  for (const SettledSmoother::Quantity& q : read) each.push_back(&q);
+  const MatrixXd what_is_left = point.left - point.smoother->smoothed(each, point.left, point.white);
   MatrixXd filled = measured_;
   for (Index c = 0; c < channels; ++c) {
-    const SettledSmoother::Quantity q = point.smoother->quantity(point.smoother->filter().C.row(c));
-    const VectorXd left = point.left.col(c) - point.smoother->smoothed(q, series);
+    const VectorXd left = what_is_left.col(c);
     // What the smoother leaves has the variance of the noise less that of the estimate.
-    const double level = noise_level(masked(left, missing_.col(c)), 1), noise = std::sqrt(level * level + q.variance[n / 2]);
+    const double level = noise_level(masked(left, missing_.col(c)), 1), noise = std::sqrt(level * level + point.smoother->variance(point.smoother->filter().C.row(c))[n / 2]);
     if (noise > 0) sigma_[c] = std::max(std::min(sigma[c], noise), rounding_level(run_->channel(c < outputs() ? channels_[static_cast<std::size_t>(c)] : "alpha").value));
     filled.col(c) -= missing_.col(c).select(left, VectorXd::Zero(n));
     if (c != angle) continue;
@@ -239,22 +358,39 @@ void RestlessRun::settle_noise(const VectorXd& theta) {
   last_.reset();
 }
 
-void RestlessRun::settle_roughness(const VectorXd& theta) {
-  constexpr double smoothest = -6, roughest = 1, enough = 0.05, golden = 0.6180339887498949;  // decades
-  const auto improbability = [&](double decade) {
-    roughness_ = std::pow(10, decade);
-    const std::shared_ptr<Point> point = point_at(theta);
-    return static_cast<double>(samples()) * point->log_determinant + point->chi2;
-  };
-  double low = smoothest, high = roughest, a = high - golden * (high - low), b = low + golden * (high - low), at_a = improbability(a), at_b = improbability(b);
-  while (high - low > enough)
-    if (at_a < at_b) {
-      high = b, b = a, at_b = at_a, a = high - golden * (high - low), at_a = improbability(a);
-    } else {
-      low = a, a = b, at_a = at_b, b = low + golden * (high - low), at_b = improbability(b);
+void RestlessRun::settle_roughness(const VectorXd& theta, Look look) {
+  constexpr double smoothest = -6, roughest = 1, like_a_parabola = 0.2, golden = 0.6180339887498949, reach = 0.25;  // decades
+  std::map<double, double> improbability;
+  const auto ask = [&](double decade) {
+    const auto [place, is_new] = improbability.try_emplace(decade, 0);
+    if (is_new) {
+      roughness_ = std::pow(10, decade);
+      const std::shared_ptr<Point> point = point_at(theta);
+      place->second = static_cast<double>(samples()) * point->log_determinant + point->chi2;
     }
-  roughness_ = std::pow(10, (low + high) / 2);
+    return place->second;
+  };
   last_.reset();
+  const double was = std::log10(roughness_);
+  double low = look == Look::near ? std::max(smoothest, was - reach) : smoothest, high = look == Look::near ? std::min(roughest, was + reach) : roughest;
+  double a = high - golden * (high - low), b = low + golden * (high - low);
+  while (high - low > like_a_parabola)
+    if (ask(a) < ask(b))
+      high = b, b = a, a = high - golden * (high - low);
+    else
+      low = a, a = b, b = low + golden * (high - low);
+  const auto least = std::min_element(improbability.begin(), improbability.end(), [](const auto& x, const auto& y) { return x.second < y.second; });
+  const double best = least->first;
+  const bool between = least != improbability.begin() && std::next(least) != improbability.end();
+  if (!between && look == Look::near) return settle_roughness(theta, Look::everywhere);
+  double found = best;
+  if (between) {
+    const auto [x0, y0] = *std::prev(least);
+    const auto [x2, y2] = *std::next(least);
+    const double left = (least->second - y0) / (best - x0), right = (y2 - least->second) / (x2 - best);
+    if (right > left) found = (x0 + best) / 2 - left * (x2 - x0) / (2 * (right - left));
+  }
+  roughness_ = std::pow(10, found);
 }
 
 }  // namespace unrig

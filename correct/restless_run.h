@@ -25,13 +25,15 @@ namespace unrig {
 /// with the exact step T, J of the rig, its lags and those of a rigid section beside it (correct/loaded_system.h). At a given theta the motion is then the mean of these states for given
 /// readings (correct/settled_smoother.h), and what is left, chi-square over data and prior with motion and offsets eliminated, is the sum of squares of the innovations e(y), a
 /// linear function of the readings. By Kaufman's rule, as there, the slopes of these residuals are -e(s_j) beside what the offsets reach, s_j = (d gauge / d theta_j) of the
-/// estimated motion: a convolution of its c with the derivative of the response to one spline.
+/// estimated motion: a convolution of its c with the derivative of the response to one spline. Long records are taken piece by piece (core/convolution.h), and these slopes, which are as smooth as
+/// the estimated motion is, are looked at on every few samples (`looked`) where squares of them are summed; what they have in common with the readings is summed over all.
 ///
 /// The shaft is taken to have been on its way before the first sample, as uncertain there as later for given past, and the section is steady there. Missing samples are filled with the
 /// smoother's own estimate, which is exact for the estimate and leaves the band as if they were there.
 class RestlessRun {
  public:
-  RestlessRun(const AeroelasticModel& model, const Run& run);
+  /// Records of more samples than `in_one_piece` are taken piece by piece.
+  RestlessRun(const AeroelasticModel& model, const Run& run, Eigen::Index in_one_piece = 1 << 16);
 
   /// chi-square infinite where the rig would flutter or diverge within the record.
   RunResidual::Solution solve(const Eigen::VectorXd& theta) const;
@@ -40,31 +42,50 @@ class RestlessRun {
 
   /// Noise of each channel from what the model at theta leaves of it, where that is less; angle samples that stand alone are left out, missing ones filled.
   void settle_noise(const Eigen::VectorXd& theta);
-  /// tau that makes the readings most probable at theta.
-  void settle_roughness(const Eigen::VectorXd& theta);
+  /// tau that makes the readings most probable at theta. `near`: only within a quarter of a decade of what it is, as long as it is found there.
+  enum class Look { everywhere, near };
+  void settle_roughness(const Eigen::VectorXd& theta, Look look);
+  /// Takes over what the same run, or a part of it, has settled on.
+  void take_roughness_of(const RestlessRun& other) { roughness_ = other.roughness_; }
 
   /// Everything known at one theta.
   struct Point {
     Eigen::VectorXd theta;
     LinearSystem system;  ///< without partials
     std::optional<SettledSmoother> smoother;
-    std::vector<Eigen::MatrixXd> columns;  ///< what one of each linear unknown does, samples x channels
-    Eigen::MatrixXd white_columns;         ///< samples times channels x linear unknowns
+    std::vector<Eigen::MatrixXd> signals;  ///< what one of each exogenous state does, samples x channels
+    Eigen::MatrixXd white_columns;         ///< innovations of what one of each linear unknown does: samples times channels x linear unknowns
+    Eigen::MatrixXd linear_factor;         ///< their triangle
     Eigen::VectorXd linear;
     Eigen::MatrixXd left;                  ///< readings without what they reach, samples x channels
     Eigen::MatrixXd white;                 ///< innovations of that
     double chi2 = 0, log_determinant = 0;
   };
   const Point& at(const Eigen::VectorXd& theta) const;
+  /// Lets go of all that is as long as the record, here and in the last point: filter and smoother stay.
+  void forget_readings();
   /// By how many powers of e the rig's least stable motion in the stream grows over the record; negative where all decay.
   double growth(const Eigen::VectorXd& theta) const;
   /// Rows over the filter's states, at the sample where they stand.
   Eigen::RowVectorXd row(const Eigen::RowVectorXd& over_model_states) const;
+  /// What one of linear unknown j does: samples x channels.
+  Eigen::MatrixXd column(const Point& point, Eigen::Index j) const;
   /// Spline coefficients of the motion as deviation from the first, for convolution with spline responses.
-  Eigen::VectorXd motion(const Point& point, const SettledSmoother::Series& series) const;
-  /// Hands `take` the derivative of every output, with that motion (its transform), with respect to each parameter in turn: its place among them, samples x outputs.
-  void slopes(const Point& point, const Eigen::VectorXcd& motion, const std::vector<Eigen::Index>& parameters,
-              const std::function<void(Eigen::Index place, const Eigen::MatrixXd& slope)>& take) const;
+  Eigen::VectorXd motion(const Point& point) const;
+  /// Derivatives of the readings, samples x channels, and of the loads at the samples asked for, with that motion, with respect to a parameter.
+  struct Slope {
+    Eigen::MatrixXd readings, loads;
+  };
+  /// Hands them to `take` with the parameter's place among `parameters`, from several threads at once. No `at`: no loads.
+  void slopes(const Point& point, const Eigen::VectorXd& motion, const std::vector<Eigen::Index>& parameters, const std::vector<Eigen::Index>& at,
+              const std::function<void(Eigen::Index place, Slope slope)>& take) const;
+  /// Samples that say all of a slope, and how many each stands for. In a long record they lie one radian apart of the fastest that the angle shows, w = roughness^(1/4); behind that the smoother
+  /// lets (roughness / w^4)^2 through. At both ends, where a record may break off in the middle of a motion, every sample.
+  struct Looked {
+    std::vector<Eigen::Index> at;
+    Eigen::VectorXd weight;
+  };
+  Looked looked() const;
 
   Eigen::Index outputs() const { return static_cast<Eigen::Index>(channels_.size()); }  ///< fitted channels but the angle, which comes last
   Eigen::Index samples() const { return run_->samples(); }
@@ -74,7 +95,6 @@ class RestlessRun {
   double roughness() const { return roughness_; }  ///< tau over the noise of the angle
   double angle_level() const { return conditions_.onset_angle; }
   double dt() const { return run_->dt; }
-  const Convolution& convolution() const { return convolution_; }
   const Conditions& conditions() const { return conditions_; }
   Eigen::Index longest_gap() const { return longest_gap_; }
   double longest_gap_at() const { return longest_gap_at_; }  ///< s
@@ -82,12 +102,14 @@ class RestlessRun {
  private:
   std::shared_ptr<Point> point_at(const Eigen::VectorXd& theta) const;
   void fill_between_neighbours();
+  std::shared_ptr<const Convolution> convolution_for(const Eigen::MatrixXd& L, const LinearSystem& system) const;
+  std::vector<Eigen::Index> driven_states() const;
 
   const AeroelasticModel* model_;
   const Run* run_;
   Conditions conditions_;
+  Eigen::Index in_one_piece_;
   std::vector<std::string> channels_;
-  Convolution convolution_;
   std::vector<Eigen::Index> kept_;       ///< states of the loaded system that the filter has: all but signals
   std::vector<Eigen::Index> exogenous_;
   Eigen::Index motion_state_ = 0;
@@ -98,6 +120,7 @@ class RestlessRun {
   double roughness_ = 0.1;
   Eigen::Index observations_ = 0, longest_gap_ = 0;
   double longest_gap_at_ = 0;
+  mutable std::shared_ptr<const Convolution> convolution_;
   mutable std::shared_ptr<Point> last_;
 };
 

@@ -5,6 +5,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 #include <numbers>
@@ -91,7 +92,7 @@ TEST(RestlessRun, SlopesOfChiSquareAreItsDifferences) {
   const AeroelasticModel model = free_circulation();
   RestlessRun run(model, r.run);
   const VectorXd theta = theta_for(model, test::null_fit(), "");
-  run.settle_roughness(theta);
+  run.settle_roughness(theta, RestlessRun::Look::everywhere);
   std::vector<Index> all;
   for (Index j = 0; j < theta.size(); ++j) all.push_back(j);
   const RunResidual::Evaluation e = run.differentiate(run.solve(theta), all);
@@ -106,6 +107,37 @@ TEST(RestlessRun, SlopesOfChiSquareAreItsDifferences) {
     // Beside truncation, h^2: the uncertainty of the first state depends on theta, which the slope leaves out; 4e-3 measured in so short a record.
     EXPECT_NEAR(gradient[j], difference, 0.01 * std::abs(difference)) << name << " off by " << gradient[j] / difference - 1;
   }
+}
+
+/// What a piece begins with is handed on to it, slow lags and all: the same numbers as from the record in one piece.
+TEST(RestlessRun, PiecesMakeTheWholeRecord) {
+  const Recorded r = record(&many_frequencies, 70000);
+  const AeroelasticModel model = free_circulation();
+  VectorXd theta = theta_for(model, test::null_fit(), "");
+  std::vector<Index> all;
+  for (Index j = 0; j < theta.size(); ++j) all.push_back(j);
+  RestlessRun pieces(model, r.run), whole(model, r.run, r.run.samples());
+  pieces.settle_roughness(theta, RestlessRun::Look::near);
+  whole.take_roughness_of(pieces);
+  const RunResidual::Solution at_pieces = pieces.solve(theta), at_whole = whole.solve(theta);
+  ASSERT_GT(pieces.at(theta).smoother->convolution().far(), 0);
+  ASSERT_EQ(whole.at(theta).smoother->convolution().far(), 0);
+  EXPECT_NEAR(at_pieces.chi2, at_whole.chi2, 1e-8 * at_whole.chi2);
+  const RestlessRun::Point& one = whole.at(theta);
+  EXPECT_LT((pieces.at(theta).white - one.white).cwiseAbs().maxCoeff(), 1e-6) << "of the noise: the splines between nodes";
+  const VectorXd uncertain = one.linear_factor.inverse().rowwise().norm();
+  EXPECT_LT((at_pieces.linear - at_whole.linear).cwiseQuotient(uncertain).cwiseAbs().maxCoeff(), 1e-4);
+
+  const RunResidual::Evaluation e = pieces.differentiate(at_pieces, all), expected = whole.differentiate(at_whole, all);
+  ASSERT_LT(pieces.looked().at.size(), whole.looked().at.size() / 2);
+  EXPECT_NEAR(pieces.looked().weight.sum(), static_cast<double>(r.run.samples()), 1e-6);
+  const VectorXd size = expected.jacobian.colwise().norm();
+  const VectorXd downhill = e.jacobian.transpose() * e.residual, expected_downhill = expected.jacobian.transpose() * expected.residual;
+  EXPECT_LT((downhill - expected_downhill).cwiseQuotient(size).cwiseAbs().maxCoeff(), 1e-4 * std::sqrt(at_whole.chi2));
+  // Information, from some samples for all: that of any direction, in which parameters may nearly cancel, to a part in a thousand.
+  const Eigen::MatrixXd root = (expected.jacobian * size.cwiseInverse().asDiagonal()).topRows(theta.size()), found = (e.jacobian * size.cwiseInverse().asDiagonal()).topRows(theta.size());
+  const Eigen::MatrixXd ratio = root.transpose().fullPivLu().solve(found.transpose());
+  EXPECT_LT((ratio * ratio.transpose() - Eigen::MatrixXd::Identity(theta.size(), theta.size())).cwiseAbs().maxCoeff(), 1e-3);
 }
 
 FittedRig with_friction() {
@@ -163,6 +195,26 @@ TEST(Restless, LoadIsFoundInTimeThatGoesWithTheRecord) {
     EXPECT_NEAR(result.slope, slope, 3 * result.slope_std);
     EXPECT_TRUE(result.warnings.empty()) << result.warnings.front();
   }
+}
+
+/// Long enough for a search that begins on a part of the record and for several pieces.
+TEST(Restless, ALongRecordIsFoundPieceByPiece) {
+  constexpr Index samples = 90000;
+  const Recorded r = record(&many_frequencies, samples);
+  const CorrectResult result = correct({test::null_rig(), test::null_fit(), r.run, 0});
+  for (const bool circulatory : {true, false}) {
+    const CorrectedLoad& load = circulatory ? result.circulatory : result.normal_force;
+    const VectorXd& truth = circulatory ? r.circulatory : r.normal_force;
+    const VectorXd off = load.value - truth, in_deviations = off.cwiseAbs().cwiseQuotient(load.std);
+    EXPECT_LT(rms(off), (circulatory ? 0.0015 : 0.005) * (truth.maxCoeff() - truth.minCoeff())) << "as in a shorter one";
+    for (Index tenth = 0; tenth < 10; ++tenth) EXPECT_GT((in_deviations.segment(tenth * samples / 10, samples / 10).array() < 1.96).cast<double>().mean(), 0.85) << tenth;
+    EXPECT_LT(in_deviations.maxCoeff(), load.simultaneous + 1);
+    EXPECT_GT(in_deviations.mean(), 0.4);
+    EXPECT_LT((load.by_source.rowwise().norm() - load.std).cwiseAbs().maxCoeff(), 1e-12);
+  }
+  EXPECT_NEAR(result.reduced_chi2, 1, 0.02);
+  EXPECT_NEAR(result.slope, slope, 3 * result.slope_std);
+  EXPECT_TRUE(result.warnings.empty()) << result.warnings.front();
 }
 
 /// Six hundred knots would lie two samples apart: the load was up to 27 standard deviations off when 400 knots had to do.
