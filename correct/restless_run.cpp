@@ -329,15 +329,31 @@ RunResidual::Evaluation RestlessRun::differentiate(const RunResidual::Solution& 
   return e;
 }
 
+MatrixXd RestlessRun::left_by_smoother(const Point& point) const {
+  std::vector<SettledSmoother::Quantity> read;
+  std::vector<const SettledSmoother::Quantity*> each;
+  for (const RowVectorXd& row : point.smoother->filter().C.rowwise()) read.push_back(point.smoother->quantity(row));
+  for (const SettledSmoother::Quantity& q : read) each.push_back(&q);
+  return point.left - point.smoother->smoothed(each, point.left, point.white);
+}
+
+void RestlessRun::settle_missing(const VectorXd& theta) {
+  constexpr int most = 12;
+  constexpr double settled = 0.1;  // of the noise
+  for (int round = 0; round < most && missing_.any(); ++round) {
+    const MatrixXd off = missing_.select(left_by_smoother(at(theta)), MatrixXd::Zero(samples(), outputs() + 1));
+    measured_ -= off;
+    last_.reset();
+    if ((off.cwiseAbs().colwise().maxCoeff().transpose().cwiseQuotient(sigma_)).maxCoeff() < settled) return;
+  }
+}
+
 void RestlessRun::settle_noise(const VectorXd& theta) {
+  settle_missing(theta);
   const Point& point = at(theta);
   const Index n = samples(), channels = outputs() + 1, angle = channels - 1;
   const VectorXd sigma = sigma_;
-  std::vector<SettledSmoother::Quantity> read;
-  std::vector<const SettledSmoother::Quantity*> each;
-  for (Index c = 0; c < channels; ++c) read.push_back(point.smoother->quantity(point.smoother->filter().C.row(c)));
-  for (const SettledSmoother::Quantity& q : read) each.push_back(&q);
-  const MatrixXd what_is_left = point.left - point.smoother->smoothed(each, point.left, point.white);
+  const MatrixXd what_is_left = left_by_smoother(point);
   MatrixXd filled = measured_;
   for (Index c = 0; c < channels; ++c) {
     const VectorXd left = what_is_left.col(c);

@@ -102,6 +102,10 @@ class RestlessRun {
  private:
   std::shared_ptr<Point> point_at(const Eigen::VectorXd& theta) const;
   void fill_between_neighbours();
+  /// Missing samples as the smoother has them, again and again: each time it knows of what it has filled in itself.
+  void settle_missing(const Eigen::VectorXd& theta);
+  /// Readings without what is found of them, samples x channels.
+  Eigen::MatrixXd left_by_smoother(const Point& point) const;
   std::shared_ptr<const Convolution> convolution_for(const Eigen::MatrixXd& L, const LinearSystem& system) const;
   std::vector<Eigen::Index> driven_states() const;
 
