@@ -17,19 +17,6 @@ using Eigen::VectorXd;
 using run_rows::compress;
 using run_rows::stacked;
 
-namespace {
-
-MatrixXd power(MatrixXd base, Index exponent) {
-  MatrixXd result = MatrixXd::Identity(base.rows(), base.cols());
-  for (; exponent > 0; exponent /= 2) {
-    if (exponent % 2 == 1) result = result * base;
-    base = base * base;
-  }
-  return result;
-}
-
-}  // namespace
-
 VectorXd RunResidual::initial_state(const VectorXd& linear, Index states) const {
   VectorXd state = VectorXd::Zero(states);
   for (std::size_t i = 0; i < free_.size(); ++i) state[free_[i]] = linear[first_state_ + static_cast<Index>(i)];
