@@ -74,25 +74,25 @@ Search estimate(RestlessRun& run, const AeroelasticModel& model, const RestlessP
   constexpr double roughly = 10, well = 1e-2;  // of a chi-square whose own scatter is some hundreds
   VectorXd theta = problem.start;
   Prior prior = problem.prior;
-  const auto learn_noise = [&](RestlessRun& from, RestlessRun::Look look) {
-    from.settle_noise(theta);
-    from.settle_roughness(theta, look);
-  };
   const Run first = beginning_of(problem.run, enough_to_begin_with(problem.run));
   const bool in_parts = first.samples() < problem.run.samples();
   std::optional<RestlessRun> beginning;
   if (in_parts) beginning.emplace(model, first);
   RestlessRun& part = in_parts ? *beginning : run;
   theta = minimise(searched(part, model, prior), prior, theta, roughly, false).solution.theta;
-  learn_noise(part, RestlessRun::Look::everywhere);
+  part.settle_noise(theta);
+  part.settle_roughness(theta, RestlessRun::Look::everywhere);
   if (in_parts) {
-    Search search = minimise(searched(part, model, prior), prior, theta, well, true);
+    const Search search = minimise(searched(part, model, prior), prior, theta, well, true);
     theta = search.solution.theta;
     prior.amplitude = search.prior.amplitude;
+    run.settle_noise(theta);  // before it is held to the roughness of a part: where the motion is rougher elsewhere, its readings would be taken for spikes
     run.take_roughness_of(part);
+    run.settle_roughness(theta, RestlessRun::Look::near);
     beginning.reset();
   }
-  learn_noise(run, RestlessRun::Look::near);
+  run.settle_noise(theta);
+  run.settle_roughness(theta, RestlessRun::Look::near);
   return minimise(searched(run, model, prior), prior, theta, well, true);
 }
 

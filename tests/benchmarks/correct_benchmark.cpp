@@ -127,9 +127,9 @@ void correct_a_restless_run(benchmark::State& state, double (*motion)(double t, 
     state.counters["worst_tenth"] = worst;
   }
 }
-BENCHMARK_CAPTURE(correct_a_restless_run, sine, &sine)->ArgName("samples")->Arg(10000)->Arg(100000)->Arg(1000000)->Unit(benchmark::kMillisecond);
-BENCHMARK_CAPTURE(correct_a_restless_run, twelve_frequencies, &twelve_frequencies)->ArgName("samples")->Arg(10000)->Arg(100000)->Arg(1000000)->Unit(benchmark::kMillisecond);
-BENCHMARK_CAPTURE(correct_a_restless_run, chirp, &chirp)->ArgName("samples")->Arg(10000)->Arg(100000)->Unit(benchmark::kMillisecond);
+BENCHMARK_CAPTURE(correct_a_restless_run, sine, &sine)->ArgName("samples")->Arg(10000)->Arg(100000)->Arg(1000000)->Unit(benchmark::kMillisecond)->MeasureProcessCPUTime();
+BENCHMARK_CAPTURE(correct_a_restless_run, twelve_frequencies, &twelve_frequencies)->ArgName("samples")->Arg(10000)->Arg(100000)->Arg(1000000)->Unit(benchmark::kMillisecond)->MeasureProcessCPUTime();
+BENCHMARK_CAPTURE(correct_a_restless_run, chirp, &chirp)->ArgName("samples")->Arg(10000)->Arg(100000)->Unit(benchmark::kMillisecond)->MeasureProcessCPUTime();
 
 }  // namespace
 }  // namespace unrig

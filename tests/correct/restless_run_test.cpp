@@ -35,6 +35,13 @@ double many_frequencies(double t) {
   return 1.5 * soft((t - 0.2) / 0.3) * sum;
 }
 
+/// From 0.2 to 5 Hz in three minutes: its end is far rougher than its beginning.
+double chirp(double t) {
+  constexpr double first = 0.2, last = 5, duration = 180;
+  const double growth = std::log(last / first);
+  return 2 * soft((t - 0.2) / 0.3) * std::sin(2 * pi * first * duration / growth * std::expm1((t - 0.2) / duration * growth));
+}
+
 /// Ten steps of 1.3 degrees in 40 ms, up and down, with rests between.
 double ten_steps(double t) {
   double angle = 0;
@@ -199,22 +206,25 @@ TEST(Restless, LoadIsFoundInTimeThatGoesWithTheRecord) {
 
 /// Long enough for a search that begins on a part of the record and for several pieces.
 TEST(Restless, ALongRecordIsFoundPieceByPiece) {
-  constexpr Index samples = 90000;
-  const Recorded r = record(&many_frequencies, samples);
-  const CorrectResult result = correct({test::null_rig(), test::null_fit(), r.run, 0});
-  for (const bool circulatory : {true, false}) {
-    const CorrectedLoad& load = circulatory ? result.circulatory : result.normal_force;
-    const VectorXd& truth = circulatory ? r.circulatory : r.normal_force;
-    const VectorXd off = load.value - truth, in_deviations = off.cwiseAbs().cwiseQuotient(load.std);
-    EXPECT_LT(rms(off), (circulatory ? 0.0015 : 0.005) * (truth.maxCoeff() - truth.minCoeff())) << "as in a shorter one";
-    for (Index tenth = 0; tenth < 10; ++tenth) EXPECT_GT((in_deviations.segment(tenth * samples / 10, samples / 10).array() < 1.96).cast<double>().mean(), 0.85) << tenth;
-    EXPECT_LT(in_deviations.maxCoeff(), load.simultaneous + 1);
-    EXPECT_GT(in_deviations.mean(), 0.4);
-    EXPECT_LT((load.by_source.rowwise().norm() - load.std).cwiseAbs().maxCoeff(), 1e-12);
+  for (double (*const motion)(double) : {&many_frequencies, &chirp}) {
+    constexpr Index samples = 90000;
+    const Recorded r = record(motion, samples);
+    const CorrectResult result = correct({test::null_rig(), test::null_fit(), r.run, 0});
+    for (const bool circulatory : {true, false}) {
+      const CorrectedLoad& load = circulatory ? result.circulatory : result.normal_force;
+      const VectorXd& truth = circulatory ? r.circulatory : r.normal_force;
+      const VectorXd off = load.value - truth, in_deviations = off.cwiseAbs().cwiseQuotient(load.std);
+      EXPECT_LT(rms(off), (circulatory ? 0.0015 : 0.005) * (truth.maxCoeff() - truth.minCoeff())) << "as in a shorter one";
+      for (Index tenth = 0; tenth < 10; ++tenth) EXPECT_GT((in_deviations.segment(tenth * samples / 10, samples / 10).array() < 1.96).cast<double>().mean(), 0.85) << tenth;
+      EXPECT_LT(in_deviations.maxCoeff(), load.simultaneous + 1);
+      EXPECT_GT(in_deviations.mean(), 0.4);
+      EXPECT_LT((load.by_source.rowwise().norm() - load.std).cwiseAbs().maxCoeff(), 1e-12);
+    }
+    // Of 180 000 readings, 0.0033: three times that. 1.02 where fast readings of the chirp were taken for spikes.
+    EXPECT_NEAR(result.reduced_chi2, 1, 0.01);
+    EXPECT_NEAR(result.slope, slope, 3 * result.slope_std);
+    EXPECT_TRUE(result.warnings.empty()) << result.warnings.front();
   }
-  EXPECT_NEAR(result.reduced_chi2, 1, 0.02);
-  EXPECT_NEAR(result.slope, slope, 3 * result.slope_std);
-  EXPECT_TRUE(result.warnings.empty()) << result.warnings.front();
 }
 
 /// Six hundred knots would lie two samples apart: the load was up to 27 standard deviations off when 400 knots had to do.
