@@ -37,12 +37,18 @@ Strings hidden_in(const Strings& effects, std::size_t trial, bool pairs, std::mt
   return hidden;
 }
 
+constexpr double usual_noise = 0.03;  // N
+
+std::vector<PlannedRun> plan(const TrialProblem& problem, std::mt19937_64& random) {
+  return problem.recordings.empty() ? draw_runs(problem.noise.value_or(usual_noise), random) : runs_like(problem.rig, problem.recordings, problem.noise, random);
+}
+
 TrialOutcome run_trial(const TrialProblem& problem, const Strings& effects, std::size_t trial) {
   std::mt19937_64 random = random_of(problem.seed, trial);
   TrialOutcome outcome;
   outcome.hidden = hidden_in(effects, trial, problem.pairs, random);
   try {
-    const TrialCampaign campaign = draw_campaign(problem.rig, outcome.hidden, problem.noise, random);
+    const TrialCampaign campaign = draw_campaign(problem.rig, outcome.hidden, plan(problem, random), random);
     outcome.parameters = campaign.parameters;
     outcome.size = campaign.size;
     outcome.sizes = campaign.sizes;
@@ -126,7 +132,9 @@ TrialResult run_trials(const TrialProblem& problem) {
     throw InputError({"--outside", 0}, fmt::format("{} to hide in turn, {} at a time", ids.size(), at_a_time), "wanted candidates beside what is hidden", "Name more of --effects.");
   TrialResult result;
   result.seed = problem.seed;
-  result.noise = problem.noise;
+  std::mt19937_64 any;
+  for (const PlannedRun& run : plan(problem, any)) result.noise = std::max(result.noise, run.noise);
+  for (const Run& run : problem.recordings) result.recordings.push_back(run.file);
   result.outcomes.resize(static_cast<std::size_t>(problem.trials));
   std::mutex mutex;
   int done = 0;
@@ -153,13 +161,14 @@ std::string to_json(const TrialResult& r) {
     scores.push_back({{"effect", id}, {"hidden", s.hidden}, {"found", s.found}, {"equivalent", s.equivalent},
                       {"smallest_found", s.found > 0 ? ordered_json(s.smallest_found) : ordered_json(nullptr)},
                       {"found_nine_in_ten_from", s.nine_in_ten > 0 ? ordered_json(s.nine_in_ten) : ordered_json(nullptr)}});
-  const ordered_json json = {{"unrig", "trial"}, {"seed", r.seed}, {"noise", {{"gauge", r.noise}, {"unit", "N"}}}, {"nulls", r.nulls}, {"false_alarms", r.false_alarms},
+  const ordered_json json = {{"unrig", "trial"}, {"seed", r.seed}, {"noise", {{"gauge", r.noise}, {"unit", "N"}}}, {"recordings", r.recordings}, {"nulls", r.nulls}, {"false_alarms", r.false_alarms},
                              {"wrong_names", r.wrong_names}, {"misses", r.misses}, {"confusion", r.confusion}, {"effects", scores}, {"trials", trials}};
   return json.dump(2) + "\n";
 }
 
 std::string report(const TrialResult& r) {
-  std::string text = fmt::format("{} trials, seed {}, noise {:.4g} N: {} false alarms in {} campaigns with nothing hidden\n", r.outcomes.size(), r.seed, r.noise, r.false_alarms, r.nulls);
+  const std::string like = r.recordings.empty() ? "" : fmt::format(", runs like {}", fmt::join(r.recordings, ", "));
+  std::string text = fmt::format("{} trials, seed {}, noise {:.4g} N{}: {} false alarms in {} campaigns with nothing hidden\n", r.outcomes.size(), r.seed, r.noise, like, r.false_alarms, r.nulls);
   text += fmt::format("    of {} with something hidden {} named an effect that was not there, {} named nothing\n", r.outcomes.size() - static_cast<std::size_t>(r.nulls), r.wrong_names, r.misses);
   text += "[[Hidden -> found]]\n";
   for (const auto& [hidden, row] : r.confusion)

@@ -1,10 +1,12 @@
 #pragma once
 #include <functional>
 #include <map>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "core/rig.h"
+#include "core/run.h"
 
 namespace unrig {
 
@@ -16,7 +18,8 @@ struct TrialProblem {
   bool pairs = false;                ///< hide two effects at a time
   bool outside = false;              ///< what is hidden is not among the candidates: nothing should be named
   unsigned seed = 1;
-  double noise = 0.03;               ///< of the gauge [N]
+  std::vector<Run> recordings;       ///< whose conditions, motion, sampling and noise the simulated runs repeat; none: runs are drawn
+  std::optional<double> noise;       ///< of the gauge [N]; without it that of the recordings, or 0.03
   std::function<void(const std::string&)> progress;  ///< called from one thread at a time
 };
 
@@ -49,13 +52,14 @@ struct TrialResult {
   int nulls = 0, false_alarms = 0;    ///< campaigns with nothing hidden, and those of them where something was named
   int wrong_names = 0, misses = 0;    ///< with something hidden: an effect was named that was not there; nothing was named
   unsigned seed = 0;
-  double noise = 0;
+  std::vector<std::string> recordings;  ///< files that the simulated runs repeat
+  double noise = 0;                     ///< of the gauge [N]; of several recordings the largest
 };
 
 /// Trial i hides nothing (i = 0 and every further round), or the next of `effects`, or it and another one; sizes and rigs are drawn anew from (seed, i), so
 /// that a trial depends on nothing but these two numbers.
 ///
-/// Throws InputError where the rig cannot be plucked and pitched (trial_campaign.h), or where `outside` would leave no candidate.
+/// Throws InputError where the rig cannot be plucked and pitched (trial_campaign.h), a recording cannot be repeated (trial_plan.h), or `outside` would leave no candidate.
 TrialResult run_trials(const TrialProblem& problem);
 
 /// "nothing", or the names with " + " between them, in alphabetical order.

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 
 #include "core/effects/effect.h"
 #include "core/error.h"
@@ -13,14 +12,8 @@ namespace {
 
 using Eigen::Index;
 using Eigen::VectorXd;
-using std::numbers::pi;
 using Random = std::mt19937_64;
-
-constexpr double dt = 0.002, pluck_seconds = 5, step_seconds = 6, angle_noise = 0.01 * pi / 180;
-constexpr Index finer = 4;
-
-double between(Random& random, double low, double high) { return std::uniform_real_distribution<double>(low, high)(random); }
-double log_between(Random& random, double low, double high) { return std::exp(between(random, std::log(low), std::log(high))); }
+using Strings = std::vector<std::string>;
 
 /// From far below what the noise lets one see to what nobody overlooks; parameter by parameter, evenly in the logarithm.
 struct Range {
@@ -50,45 +43,6 @@ VectorXd draw_parameters(const Effect& e, const AeroelasticModel& model, double 
   return p;
 }
 
-void put(Run& run, const std::string& name, const std::string& unit, const VectorXd& value) { run.channels.push_back({name, unit, unit, 1, value, 0}); }
-
-struct Planned {
-  Run fine;
-  double release = 0, slope = 0, steady = 0;
-};
-
-Run bare_run(const std::string& name, RunKind kind, double density, double speed, double seconds) {
-  Run run;
-  run.file = name + ".csv";
-  run.name = name;
-  run.kind = kind;
-  run.medium = density > 100 ? "water" : "air";
-  run.density = density;
-  run.speed = speed;
-  run.dt = dt / finer;
-  put(run, "alpha", "rad", VectorXd::Zero(finer * static_cast<Index>(std::lround(seconds / dt))));
-  return run;
-}
-
-Planned step_run(const std::string& name, double speed, double onset, double step, double slope, double steady, Random& random) {
-  Planned p{bare_run(name, RunKind::step, 998.2, speed, step_seconds), 0, slope, steady};
-  const double begin = 1, ramp = log_between(random, 0.06, 0.12);
-  VectorXd& alpha = p.fine.channels.front().value;
-  for (Index k = 0; k < alpha.size(); ++k) alpha[k] = (onset + step * smooth_ramp((p.fine.time(k) - begin) / ramp)) * pi / 180;
-  return p;
-}
-
-std::vector<Planned> plan(Random& random) {
-  const double speed = log_between(random, 0.5, 0.7), slope = between(random, 5, 2 * pi), degree = pi / 180;
-  std::vector<Planned> runs;
-  for (const double density : {1.2, 998.2})
-    runs.push_back({bare_run(density > 100 ? "wet_pluck" : "dry_pluck", RunKind::pluck, density, 0, pluck_seconds), log_between(random, 15, 30), slope, 0});
-  runs.push_back(step_run("step_a", speed, 2, 1.3, slope, slope * 2 * degree, random));
-  runs.push_back(step_run("step_b", 0.8 * speed, 4, 2.5, slope, slope * 4 * degree, random));
-  runs.push_back(step_run("step_c", speed, 25, 1.5, between(random, 0.5, 0.7) * slope, between(random, 0.8, 1.0), random));
-  return runs;
-}
-
 VectorXd draw_rig(const AeroelasticModel& model, Random& random) {
   VectorXd theta = model.start_values();
   const auto set = [&](const char* name, double low, double high) { theta[model.index(name)] = log_between(random, low, high); };
@@ -101,7 +55,7 @@ VectorXd draw_rig(const AeroelasticModel& model, Random& random) {
 }
 
 /// What drives the same rig in one run, with and without what is hidden.
-SimulateProblem problem_of(const AeroelasticModel& model, const VectorXd& theta, const Planned& planned) {
+SimulateProblem problem_of(const AeroelasticModel& model, const VectorXd& theta, const PlannedRun& planned) {
   SimulateProblem problem{model, theta, planned.fine, {}, {}, {}};
   problem.theta[model.index("normal_force_slope")] = planned.slope;
   if (planned.release > 0) problem.release_load = planned.release;
@@ -130,14 +84,67 @@ Alone beside_the_rig(const std::string& id, const AeroelasticModel& known, const
   return alone;
 }
 
-/// What it does to the gauge in one run, r.m.s.; its signals begin at `first` of `signals`, which moves on to the next effect's.
-double trace_of(const Alone& effect, const Planned& planned, const VectorXd& signals, Index& first) {
+/// Initial values of the signals of the k-th hidden effect, of those of all.
+VectorXd own_signals(const Strings& hidden, std::size_t k, const AeroelasticModel& bare, const SimulateProblem& of_all) {
+  Index first = 0;
+  for (std::size_t i = 0;; ++i) {
+    const AeroelasticModel one = bare.with_effects({hidden[i]});
+    const auto count = static_cast<Index>(one.system(conditions_of(of_all.run), one.start_values(), {"gauge"}).exogenous.size());
+    if (i == k) return of_all.signals.segment(first, count);
+    first += count;
+  }
+}
+
+/// What it does to the gauge in one run, r.m.s.
+double trace_of(const Alone& effect, const PlannedRun& planned, const VectorXd& signals) {
   SimulateProblem problem = problem_of(effect.with, effect.theta, planned);
-  const auto own = static_cast<Index>(effect.with.system(conditions_of(problem.run), problem.theta, {"gauge"}).exogenous.size());
-  problem.signals = signals.segment(first, own);
-  first += own;
+  problem.signals = signals;
   const VectorXd theta = effect.theta.head(effect.known.start_values().size());
   return rms(gauge(problem) - gauge(problem_of(effect.known, theta, planned)));
+}
+
+/// Every mode that half the simulated sampling rate lets through, in the densest fluid, circulation within 1e-6.
+AeroelasticModel whole_model(const Rig& rig, const std::vector<PlannedRun>& runs) {
+  double nyquist = 0, density = 0;
+  for (const PlannedRun& run : runs) {
+    nyquist = std::max(nyquist, 0.5 / run.fine.dt);
+    density = std::max(density, run.fine.density);
+  }
+  return {rig, make_basis(rig, nyquist, density), wagner(Wagner::within_1e6)};
+}
+
+double first_release(const std::vector<PlannedRun>& runs) {
+  constexpr double usual = 20;
+  const auto pluck = std::find_if(runs.begin(), runs.end(), [](const PlannedRun& run) { return run.release > 0; });
+  return pluck == runs.end() ? usual : pluck->release;
+}
+
+/// Amplitudes of the signals, alike in all runs, such that the run that they disturb most is disturbed by what `signal_size` says.
+void draw_signals(const std::vector<PlannedRun>& runs, std::vector<SimulateProblem>& problems, Random& random) {
+  double disturbed = 0;
+  for (std::size_t r = 0; r < runs.size(); ++r) {
+    SimulateProblem& problem = problems[r];
+    const auto signals = static_cast<Index>(problem.model.system(conditions_of(problem.run), problem.theta, {"gauge"}).exogenous.size());
+    problem.signals = VectorXd::Zero(signals);
+    if (signals == 0) continue;
+    const VectorXd quiet = gauge(problem);
+    problem.signals = white_noise(signals, random);
+    disturbed = std::max(disturbed, rms(gauge(problem) - quiet) / runs[r].noise);
+  }
+  if (!(disturbed > 0)) return;
+  const double wanted = log_between(random, signal_size.low, signal_size.high);
+  for (SimulateProblem& problem : problems) problem.signals *= wanted / disturbed;
+}
+
+/// With noise, and whatever else the readings have.
+Run recorded(const Run& fine, const PlannedRun& planned, Random& random) {
+  Run run = every_nth(fine, PlannedRun::finer);
+  std::erase_if(run.channels, [](const Channel& c) { return c.name != "alpha" && c.name != "gauge"; });
+  for (Channel& c : run.channels) {
+    c.value += (c.name == "alpha" ? planned.angle_noise : planned.noise) * white_noise(c.value.size(), random);
+    if (const Channel* beside = planned.disturbed.find(c.name)) c.value += beside->value;
+  }
+  return run;
 }
 
 }  // namespace
@@ -147,82 +154,39 @@ void check_for_trials(const Rig& rig) {
     throw InputError({rig.file, 0}, "the rig cannot be plucked and pitched", "wanted a beam rig with a gauge, a calibration element and a submerged section", "");
 }
 
-double smooth_ramp(double x) {
-  if (x <= 0) return 0;
-  if (x >= 1) return 1;
-  return x * x * x * x * (35 + x * (-84 + x * (70 - 20 * x)));
-}
-
-Run every_nth(const Run& fine, Index n) {
-  Run run = fine;
-  run.dt = fine.dt * static_cast<double>(n);
-  for (Channel& c : run.channels) {
-    const Index samples = (c.value.size() + n - 1) / n;
-    VectorXd kept(samples);
-    for (Index k = 0; k < samples; ++k) kept[k] = c.value[n * k];
-    c.value = kept;
-  }
-  return run;
-}
-
-TrialCampaign draw_campaign(const Rig& rig, const std::vector<std::string>& hidden, double noise, Random& random) {
+TrialCampaign draw_campaign(const Rig& rig, const Strings& hidden, const std::vector<PlannedRun>& runs, Random& random) {
   check_for_trials(rig);
   TrialCampaign campaign;
   campaign.hidden = hidden;
-  campaign.sizes.assign(hidden.size(), 0);
   campaign.rig = rig;
   campaign.rig.normal.modes = 0;
   const Rig whole = campaign.rig;
-  const AeroelasticModel bare(whole, make_basis(whole, 0.5 * finer / dt, 998.2), wagner(Wagner::within_1e6)), model = bare.with_effects(hidden);
+  const AeroelasticModel bare = whole_model(whole, runs), model = bare.with_effects(hidden);
   // Of hidden modes the trace is what the truth has beside a rig of one.
+  const AeroelasticModel one_mode(whole, make_basis(whole, Index{1}, bare.basis().torsion_modes), bare.circulation());
   const bool modes_hidden = std::find(hidden.begin(), hidden.end(), "higher-mode") != hidden.end();
   if (modes_hidden) campaign.rig.normal.modes = 1;
-  const AeroelasticModel one_mode(whole, make_basis(whole, Index{1}, bare.basis().torsion_modes), bare.circulation()), &known = modes_hidden ? one_mode : bare;
 
-  const std::vector<Planned> runs = plan(random);
   const VectorXd rig_theta = draw_rig(bare, random);
   VectorXd theta = model.start_values();
   theta.head(rig_theta.size()) = rig_theta;
-  Index first = rig_theta.size();
   for (const std::string& id : hidden) {
-    const VectorXd p = draw_parameters(effect(id), bare, runs.front().release, random);
-    theta.segment(first, p.size()) = p;
+    const VectorXd p = draw_parameters(effect(id), bare, first_release(runs), random);
+    theta.segment(rig_theta.size() + static_cast<Index>(campaign.parameters.size()), p.size()) = p;
     campaign.parameters.insert(campaign.parameters.end(), p.begin(), p.end());
-    first += p.size();
   }
-
-  std::vector<Alone> alone;
-  for (const std::string& id : hidden) alone.push_back(beside_the_rig(id, id == "higher-mode" ? one_mode : bare, bare, model, theta));
-
   std::vector<SimulateProblem> problems;
-  std::vector<VectorXd> without;
-  double disturbed = 0;
-  bool signals = false;
-  for (const Planned& planned : runs) {
-    SimulateProblem problem = problem_of(model, theta, planned);
-    const LinearSystem system = model.system(conditions_of(problem.run), problem.theta, {"gauge"});
-    if (!hidden.empty()) without.push_back(gauge(problem_of(known, rig_theta, planned)));
-    if (!system.exogenous.empty()) {
-      const VectorXd quiet = gauge(problem);
-      problem.signals = white_noise(static_cast<Index>(system.exogenous.size()), random);
-      disturbed = std::max(disturbed, rms(gauge(problem) - quiet));
-      signals = true;
-    }
-    problems.push_back(problem);
+  for (const PlannedRun& planned : runs) problems.push_back(problem_of(model, theta, planned));
+  draw_signals(runs, problems, random);
+  for (std::size_t r = 0; r < runs.size(); ++r) {
+    const Run fine = simulate(problems[r]).run;
+    if (!hidden.empty()) campaign.size = std::max(campaign.size, rms(fine.channel("gauge").value - gauge(problem_of(modes_hidden ? one_mode : bare, rig_theta, runs[r]))) / runs[r].noise);
+    campaign.runs.push_back(recorded(fine, runs[r], random));
   }
-  if (signals) {
-    const double wanted = log_between(random, signal_size.low, signal_size.high) * noise;
-    for (SimulateProblem& problem : problems) problem.signals *= wanted / disturbed;
-  }
-  for (std::size_t r = 0; r < problems.size(); ++r) {
-    Run fine = simulate(problems[r]).run;
-    if (!hidden.empty()) campaign.size = std::max(campaign.size, rms(fine.channel("gauge").value - without[r]) / noise);
-    Index first_signal = 0;
-    for (std::size_t k = 0; k < alone.size(); ++k) campaign.sizes[k] = std::max(campaign.sizes[k], trace_of(alone[k], runs[r], problems[r].signals, first_signal) / noise);
-    std::erase_if(fine.channels, [](const Channel& c) { return c.name != "alpha" && c.name != "gauge"; });
-    Run recorded = every_nth(fine, finer);
-    for (Channel& c : recorded.channels) c.value += (c.name == "alpha" ? angle_noise : noise) * white_noise(c.value.size(), random);
-    campaign.runs.push_back(std::move(recorded));
+  campaign.sizes.assign(hidden.size(), 0);
+  for (std::size_t k = 0; k < hidden.size(); ++k) {
+    const Alone alone = beside_the_rig(hidden[k], hidden[k] == "higher-mode" ? one_mode : bare, bare, model, theta);
+    for (std::size_t r = 0; r < runs.size(); ++r) campaign.sizes[k] = std::max(campaign.sizes[k], trace_of(alone, runs[r], own_signals(hidden, k, bare, problems[r])) / runs[r].noise);
   }
   return campaign;
 }

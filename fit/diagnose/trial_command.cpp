@@ -17,28 +17,37 @@ namespace unrig {
 int trial_command(int argc, char** argv) {
   TrialProblem problem;
   CLI::App app{"Hides effects in simulated campaigns of a rig and counts how often `unrig diagnose` finds them.", "unrig trial"};
-  std::string rig, output, noise = "0.03 N";
-  std::vector<std::string> ids;
+  std::string rig, output, noise;
+  std::vector<std::string> ids, recordings;
   app.add_option("--rig", rig, "rig file (TOML)")->required();
+  app.add_option("runs", recordings, "recordings (CSV) that the simulated runs repeat: their conditions, motion, release, sampling and noise; without any, two plucks and three steps are drawn");
   app.add_option("--effects", ids, "effects to hide in turn, and the candidates, separated by commas; without it, all")->delimiter(',');
   app.add_option("--trials", problem.trials, "campaigns; every so many-th hides nothing")->capture_default_str()->check(CLI::Range(1, 1000000));
   app.add_flag("--pairs", problem.pairs, "hide two effects at a time");
   app.add_option("--seed", problem.seed, "of the random numbers")->capture_default_str();
-  app.add_option("--noise", noise, "standard deviation of the gauge's noise")->capture_default_str();
+  app.add_option("--noise", noise, "standard deviation of the gauge's noise; without it that of the recordings, or 0.03 N");
   app.add_flag("--outside", problem.outside, "keep what is hidden from the candidates: the right verdict is `unexplained`");
   app.add_option_function<int>("--threads", use_threads, "how many threads to work in; without it, as many as the machine has")->check(CLI::Range(1, 256));
   app.add_option("-o,--output", output, "result (JSON)")->required();
-  app.footer("Example:\n  unrig trial --rig rig.toml --effects tank-wave,gauge-lowpass --trials 30 --seed 1 -o trial.json");
+  app.footer("Example:\n  unrig trial --rig rig.toml dry_pluck.csv wet_pluck.csv step.csv --effects tank-wave,gauge-lowpass --trials 30 -o trial.json");
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& e) {
     return app.exit(e) == 0 ? exit_done : exit_wrong_use;
   }
-  check_outputs({{"-o", output}}, {rig});
+  std::vector<std::string> inputs = recordings;
+  inputs.push_back(rig);
+  check_outputs({{"-o", output}}, inputs);
+  check_given_once(recordings);
   problem.rig = read_rig(rig);
   for (const std::string& warning : problem.rig.warnings) warn(warning);
-  problem.noise = quantity(noise, "N", {"--noise", 0}, "the noise");
-  if (!(problem.noise > 0)) throw InputError({"--noise", 0}, "noise of " + noise, "wanted more than none", "");
+  for (const std::string& path : recordings) problem.recordings.push_back(read_run(path));
+  for (const Run& run : problem.recordings)
+    for (const std::string& warning : run.warnings) warn(warning);
+  if (!noise.empty()) {
+    problem.noise = quantity(noise, "N", {"--noise", 0}, "the noise");
+    if (!(*problem.noise > 0)) throw InputError({"--noise", 0}, "noise of " + noise, "wanted more than none", "");
+  }
   problem.effects = effects_of_option("--effects", ids);
   Progress progress;
   problem.progress = [&](const std::string& what) { progress(what); };

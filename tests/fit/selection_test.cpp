@@ -17,7 +17,7 @@ TEST(Selection, TheFirstToBeFoundIsExchangedForWhatItStoodInFor) {
   std::seed_seq sequence{3002, 5};
   std::mt19937_64 random(sequence);
   std::uniform_int_distribution<std::size_t>(1, 14)(random);  // as `unrig trial --pairs --seed 3002` draws the second effect of trial 5
-  const TrialCampaign campaign = draw_campaign(read_rig(test::null_campaign("rig.toml")), {"quadratic-drag", "cubic-stiffness"}, 0.03, random);
+  const TrialCampaign campaign = draw_campaign(read_rig(test::null_campaign("rig.toml")), {"quadratic-drag", "cubic-stiffness"}, draw_runs(0.03, random), random);
   ASSERT_GT(campaign.sizes[0], 30);
   ASSERT_GT(campaign.sizes[1], 30);
   DiagnoseProblem problem;

@@ -19,7 +19,7 @@ TEST(TrialCampaign, HidesWhatItSaysAndRepeats) {
   const Rig rig = read_rig(test::null_campaign("rig.toml"));
   const auto draw = [&](const std::vector<std::string>& hidden) {
     std::mt19937_64 random(7);
-    return draw_campaign(rig, hidden, 0.03, random);
+    return draw_campaign(rig, hidden, draw_runs(0.03, random), random);
   };
   const TrialCampaign null = draw({}), wave = draw({"tank-wave"});
   EXPECT_EQ(null.size, 0);
@@ -37,7 +37,7 @@ TEST(TrialCampaign, GivesTheSizeOfEachOfTwo) {
   const Rig rig = read_rig(test::null_campaign("rig.toml"));
   const auto draw = [&](const std::vector<std::string>& hidden) {
     std::mt19937_64 random(7);
-    return draw_campaign(rig, hidden, 0.03, random);
+    return draw_campaign(rig, hidden, draw_runs(0.03, random), random);
   };
   const TrialCampaign hum = draw({"mains-hum"}), both = draw({"cubic-stiffness", "mains-hum"}), modes = draw({"higher-mode", "gauge-drift"});
   ASSERT_EQ(hum.sizes.size(), 1u);
@@ -50,6 +50,44 @@ TEST(TrialCampaign, GivesTheSizeOfEachOfTwo) {
   ASSERT_EQ(modes.sizes.size(), 2u);
   EXPECT_GT(modes.sizes[0], 3) << "the modes that this rig has beside the first";
   EXPECT_LT(modes.sizes[1], 20.01);
+}
+
+TEST(TrialCampaign, RepeatsRecordings) {
+  const Rig rig = read_rig(test::null_campaign("rig.toml"));
+  std::vector<unrig::Run> recordings;
+  for (const char* file : {"dry_pluck.csv", "step_b.csv", "step_c.csv"}) recordings.push_back(read_run(test::null_campaign(file)));
+  recordings[1].channels[1].value.segment(700, 3).setConstant(NAN);
+  std::mt19937_64 random(3);
+  const std::vector<PlannedRun> planned = runs_like(rig, recordings, {}, random);
+  const TrialCampaign campaign = draw_campaign(rig, {}, planned, random);
+  ASSERT_EQ(campaign.runs.size(), 3u);
+  for (std::size_t r = 0; r < 3; ++r) {
+    EXPECT_EQ(campaign.runs[r].samples(), recordings[r].samples());
+    EXPECT_EQ(campaign.runs[r].dt, recordings[r].dt);
+    EXPECT_EQ(campaign.runs[r].speed, recordings[r].speed);
+    EXPECT_EQ(campaign.runs[r].file, recordings[r].file);
+    EXPECT_NEAR(planned[r].noise, 0.02724, 0.1 * 0.02724) << "sigma of KEY.json; sixth differences of so many samples scatter by 3 %";
+  }
+  EXPECT_TRUE(campaign.runs[1].channel(recordings[1].channels[1].name).value.segment(700, 3).array().isNaN().all());
+  EXPECT_EQ(campaign.runs[1].channel(recordings[1].channels[1].name).value.array().isNaN().count(), 3);
+  const Eigen::VectorXd &angle = campaign.runs[2].channel("alpha").value, &there = recordings[2].channel("alpha").value;
+  const double apart = std::sqrt((angle - there).squaredNorm() / static_cast<double>(angle.size()));
+  EXPECT_NEAR(apart, std::sqrt(2.0) * planned[2].angle_noise, 0.1 * planned[2].angle_noise) << "the same motion, spikes included; two draws of the noise";
+  EXPECT_GT(planned[2].slope, 2.5);
+  EXPECT_LT(planned[2].slope, 0.7 * 2 * 3.1416) << "stalled at 25 degrees";
+  const auto swing = [](const Eigen::VectorXd& gauge) { return gauge.head(200).maxCoeff() - gauge.head(200).minCoeff(); };
+  EXPECT_NEAR(swing(campaign.runs[0].channel("gauge").value) / swing(recordings[0].channel("gauge").value), 1, 0.1) << "released from the same load; frequencies and damping differ";
+}
+
+TEST(TrialCampaign, RefusesRecordingsThatItCannotRepeat) {
+  const Rig rig = read_rig(test::null_campaign("rig.toml"));
+  unrig::Run run = read_run(test::null_campaign("step_b.csv"));
+  std::mt19937_64 random(3);
+  Eigen::VectorXd& alpha = run.channels[static_cast<std::size_t>(run.find("alpha") - run.channels.data())].value;
+  for (Eigen::Index k = 0; k < alpha.size(); ++k) alpha[k] = 0.05 * std::sin(0.01 * static_cast<double>(k)) + 1e-4 * std::sin(1.7 * static_cast<double>(k) * static_cast<double>(k));
+  EXPECT_THROW(runs_like(rig, {run}, {}, random), InputError) << "never at rest";
+  run.kind = RunKind::forced;
+  EXPECT_THROW(runs_like(rig, {run}, {}, random), InputError);
 }
 
 TEST(Trial, NothingHiddenAndAWave) {
