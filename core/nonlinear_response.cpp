@@ -206,7 +206,7 @@ class Follower {
     law_partial_ = MatrixXd::Zero(m, one_.parameters * (block + 1));
     if (one_.parameters > 0) laws_.partials_at(z_, law_partials(0));
     largest_ = VectorXd::Zero(m);
-    tangent_ = next_ = MatrixXd::Zero(std::max(one_.rows(), one_.input()), columns_);
+    tangent_ = next_ = MatrixXd::Zero(std::max(one_.rows(), one_.input()), columns_);  // the jerk is that of the sample
     if (directions_ > 0) tangent_.topLeftCorner(n, directions_) = drive_.start_tangent;
     if (one_.parameters > 0 && drive_.start_partial.size() > 0) tangent_.topRightCorner(n, one_.parameters) = drive_.start_partial;
     tangent_.middleRows(one_.force(), m) = slope_.col(0).asDiagonal() * (sees_ * tangent_.topRows(n));
@@ -253,27 +253,67 @@ class Follower {
       source_.noalias() = one_.partial * now_.leftCols(count);
       source_.noalias() += one_.late_partial * now_.block(one_.force(), 1, m, count);
     }
+    Index ahead = 0;  // steps over which the directions have been carried already
     for (Index k = 0; k < count; ++k) {
       const Index sample = (first + k) / per_sample_;
       const bool reads = (first + k) % per_sample_ == 0;
-      if (drive_.jerk_tangent.size() > 0) tangent_.row(one_.jerk()).head(directions_) = drive_.jerk_tangent.row(sample);
-      small_product(one_.step.data(), rows, one_.input(), tangent_.data(), tangent_.rows(), columns_, next_.data(), next_.rows());
-      auto by_parameter = next_.rightCols(p);
-      for (Index j = 0; j < p; ++j) by_parameter.col(j).head(rows) += source_.col(k).segment(j * rows, rows);
-      for (Index c = 0; c < one_.channels && reads; ++c) response_.tangent[static_cast<std::size_t>(c)].row(sample) = next_.row(one_.output() + c);
-      if (p > 0) by_parameter.topRows(rows) += one_.late.lazyProduct(law_partials(k + 1));
-      feed_back(slope_.col(k + 1));
-      if (p > 0) by_parameter.middleRows(one_.force(), m) += law_partials(k + 1);
-      next_.row(one_.jerk()).setZero();
-      tangent_.swap(next_);
+      if (reads && drive_.jerk_tangent.size() > 0) directions_jerk() = drive_.jerk_tangent.row(sample);
+      if (reads && directions_ > 0 && k + per_sample_ <= count && straight_over(k)) {
+        const MatrixXd& over_sample = straight_step(slope_.col(k));
+        small_product(over_sample.data(), rows, one_.input(), tangent_.data(), tangent_.rows(), directions_, next_.data(), next_.rows());
+        read(sample, 0, directions_);
+        tangent_.topLeftCorner(one_.jerk(), directions_) = next_.topLeftCorner(one_.jerk(), directions_);
+        ahead = per_sample_;
+      }
+      const Index from = ahead > 0 ? directions_ : 0;  // first column to be carried step by step
+      if (from < columns_) {
+        small_product(one_.step.data(), rows, one_.input(), tangent_.col(from).data(), tangent_.rows(), columns_ - from, next_.col(from).data(), next_.rows());
+        auto by_parameter = next_.rightCols(p);
+        for (Index j = 0; j < p; ++j) by_parameter.col(j).head(rows) += source_.col(k).segment(j * rows, rows);
+        if (reads) read(sample, from, columns_);
+        if (p > 0) by_parameter.topRows(rows) += one_.late.lazyProduct(law_partials(k + 1));
+        feed_back(slope_.col(k + 1), from);
+        if (p > 0) by_parameter.middleRows(one_.force(), m) += law_partials(k + 1);
+        tangent_.block(0, from, one_.jerk(), columns_ - from) = next_.block(0, from, one_.jerk(), columns_ - from);
+      }
+      if (ahead > 0) --ahead;
     }
   }
 
-  /// Puts the change of the force where that of its argument stands, and adds what it does to the state.
-  void feed_back(const Few<M>& slope) {
+  auto directions_jerk() { return tangent_.row(one_.jerk()).head(directions_); }
+
+  void read(Index sample, Index from, Index to) {
+    for (Index c = 0; c < one_.channels; ++c) response_.tangent[static_cast<std::size_t>(c)].row(sample).segment(from, to - from) = next_.row(one_.output() + c).segment(from, to - from);
+  }
+
+  /// Whether the laws have one slope each all over the sample that begins with step k.
+  bool straight_over(Index k) const { return per_sample_ > 1 && (slope_.middleCols(k + 1, per_sample_).colwise() - slope_.col(k)).isZero(0); }
+
+  /// What the steps of a sample do to [x; df; djerk] while the laws have these slopes, and what is read at its beginning: a law of straight pieces (a gap) has few.
+  const MatrixXd& straight_step(const VectorXd& slope) {
+    for (const StraightStep& known : straight_)
+      if (known.slope == slope) return known.over_sample;
+    constexpr std::size_t most = 8;
+    if (straight_.size() == most) straight_.erase(straight_.begin());
+    const Index n = one_.states, m = one_.feedbacks, size = one_.input();
+    const Few<M> s = slope;
+    const FewSquare<M> answer = s.asDiagonal() * inverse(FewSquare<M>::Identity(m, m) - gain_ * s.asDiagonal());
+    MatrixXd step = MatrixXd::Identity(size, size), all = step;
+    step.middleRows(n, m) = answer * one_.step.block(n, 0, m, size);
+    step.topRows(n) = one_.step.topLeftCorner(n, size) + one_.late.topRows(n) * step.middleRows(n, m);
+    for (Index i = 0; i < per_sample_; ++i) all = step * all;
+    MatrixXd over_sample = MatrixXd::Zero(one_.rows(), size);
+    over_sample.topRows(n + m) = all.topRows(n + m);
+    over_sample.middleRows(one_.output(), one_.channels) = one_.step.block(one_.output(), 0, one_.channels, size);
+    straight_.push_back({slope, std::move(over_sample)});
+    return straight_.back().over_sample;
+  }
+
+  /// Puts the change of the force where that of its argument stands, and adds what it does to the state, in columns `from` on.
+  void feed_back(const Few<M>& slope, Index from) {
     const Index n = one_.states, m = one_.feedbacks;
     const FewSquare<M> answer = slope.asDiagonal() * inverse(FewSquare<M>::Identity(m, m) - gain_ * slope.asDiagonal());
-    for (Index j = 0; j < columns_; ++j) {
+    for (Index j = from; j < columns_; ++j) {
       const Few<M> force = answer.lazyProduct(next_.col(j).segment(n, m));
       for (Index i = 0; i < m; ++i) next_.col(j).head(n) += force[i] * one_.late.col(i).head(n);
       next_.col(j).segment(one_.force(), m) = force;
@@ -297,6 +337,11 @@ class Follower {
   NonlinearResponse response_;
   MatrixXd now_, slope_, law_partial_, source_, tangent_, next_;
   VectorXd stepped_, largest_;
+  struct StraightStep {
+    VectorXd slope;
+    MatrixXd over_sample;  // rows x [x; f; jerk]
+  };
+  std::vector<StraightStep> straight_;
   Few<M> z_;
 };
 

@@ -170,11 +170,13 @@ VectorXd RunResidual::as_the_angle_says() const {
   return angle.solve(angle.rotated(rows.rightCols(1)));
 }
 
-/// c searched along exact tangents over a part of the record that grows from where any start will do. The least chi-squares of a motion are many: smaller strides lead to others.
+/// c searched along exact tangents over a part of the record that grows from where any start will do: of a motion, from just behind its beginning, where the angle has said nearly
+/// all and the law has turned the trajectory once at most. The least chi-squares of a motion are many: smaller strides lead to others.
 RunResidual::NonlinearPoint RunResidual::along_growing_record(const Linearised& lin, const VectorXd& theta, NonlinearPoint point) const {
   constexpr double growth = 1.3, small = 1.1, followed = 1.5;
   const bool moves = motion_.unknowns() > 0;
-  const Index before = moves ? motion_.active().front().first : 0;
+  constexpr Index hardly_moved = 20;
+  const Index before = moves ? motion_.active().front().first : 0, first = before + (moves ? hardly_moved : 2 * unknowns_);
   if (moves) point.linear = as_the_angle_says();
   const auto in_strides = [&](double stride) {
     RunResidual part = *this;
@@ -182,11 +184,11 @@ RunResidual::NonlinearPoint RunResidual::along_growing_record(const Linearised& 
     part_lin.system = lin.system;
     part_lin.step = lin.step;
     NonlinearPoint at = point;
-    for (part.last_sample_ = std::min(last_sample_, before + 2 * unknowns_); part.last_sample_ < last_sample_;) {
+    for (part.last_sample_ = std::min(last_sample_, first); part.last_sample_ < last_sample_;) {
       part.search_along_tangents(part_lin, theta, part.nonlinear_point(lin, theta, at.linear));
       if (!std::isfinite(part_lin.chi2)) return at;
       at.linear = part_lin.linear;
-      part.last_sample_ = std::min(last_sample_, static_cast<Index>(stride * static_cast<double>(part.last_sample_)) + 1);
+      part.last_sample_ = std::min(last_sample_, before + static_cast<Index>(stride * static_cast<double>(part.last_sample_ - before)) + 1);
     }
     return nonlinear_point(lin, theta, at.linear);
   };

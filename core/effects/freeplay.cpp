@@ -7,7 +7,7 @@ namespace unrig {
 
 namespace {
 
-constexpr double rounding = 0.03;  // of a corner, as a share of the gap, for searches to follow its slopes
+constexpr double rounding = 0.003;  // of a corner, as a share of the gap, for searches to follow its slopes
 constexpr Eigen::Index steps = 8;  // within a sample, in which the section may cross the whole gap
 
 /// What the gap takes from the deflection: z within it, the gap beyond.

@@ -179,7 +179,8 @@ Trial Selection::exchanged(Trial trial, const Strings& hopeless) {
 
 Trial Selection::best_set() {
   Trial best = baseline_;
-  Strings hopeless;  // laws with which alone the fit is worse than without
+  Strings hopeless;  // laws with which alone the fit is worse than without: from that far away they are not found, and are not tried again before most of the way is gone
+  constexpr double most = 0.9;
   while (best.effects.size() < most_effects && !decays_decide(best) && locate_mismatch(best.arrival.joint).found) {
     tell(best.effects.empty() ? "trying what may be missing" : "trying what may be missing beside " + best.effects.back());
     Trials tried = try_one_more(best, hopeless);
@@ -187,6 +188,7 @@ Trial Selection::best_set() {
       if (best.effects.empty() && brings_a_law(t) && bic_difference(t, baseline_) > decisive) hopeless.push_back(t.effects.back());
     if (tried.empty() || !(best.effects.empty() || plausible(tried.front())) || bic_difference(tried.front(), best) > -decisive) break;
     if (!leaves_nothing(tried.front()) && tried.front().excess() > hardly_less * best.excess()) break;
+    if (tried.front().excess() < (1 - most) * best.excess()) hopeless.clear();
     best = exchanged(without_superfluous(tried.front()), hopeless);
     std::move(tried.begin(), tried.end(), std::back_inserter(tried_));
   }
