@@ -177,6 +177,16 @@ Trial Selection::exchanged(Trial trial, const Strings& hopeless) {
   return trial;
 }
 
+/// What explains by far the most of `tried` may have come to rest at a limit because an earlier effect does part of its work: it is given the chance to do all of it.
+Trial Selection::without_stand_in(const Trials& tried) {
+  const auto best = std::min_element(tried.begin(), tried.end(), [](const Trial& a, const Trial& b) { return bic_difference(a, b) < 0; });
+  if (best->effects.size() < 2 || plausible(*best)) return tried.front();
+  Trial alone = without_superfluous(*best);
+  if (!plausible(alone) || bic_difference(alone, tried.front()) > -decisive) return tried.front();
+  ranking_.push_back({alone.effects, alone.reduced_chi2(), bic_difference(alone, baseline_), 0, 0});
+  return alone;
+}
+
 Trial Selection::best_set() {
   Trial best = baseline_;
   Strings hopeless;  // laws with which alone the fit is worse than without: from that far away they are not found, and are not tried again before most of the way is gone
@@ -186,10 +196,12 @@ Trial Selection::best_set() {
     Trials tried = try_one_more(best, hopeless);
     for (const Trial& t : tried)
       if (best.effects.empty() && brings_a_law(t) && bic_difference(t, baseline_) > decisive) hopeless.push_back(t.effects.back());
-    if (tried.empty() || !(best.effects.empty() || plausible(tried.front())) || bic_difference(tried.front(), best) > -decisive) break;
-    if (!leaves_nothing(tried.front()) && tried.front().excess() > hardly_less * best.excess()) break;
-    if (tried.front().excess() < (1 - most) * best.excess()) hopeless.clear();
-    best = exchanged(without_superfluous(tried.front()), hopeless);
+    if (tried.empty()) break;
+    const Trial next = without_stand_in(tried);
+    if (!(best.effects.empty() || plausible(next)) || bic_difference(next, best) > -decisive) break;
+    if (!leaves_nothing(next) && next.excess() > hardly_less * best.excess()) break;
+    if (next.excess() < (1 - most) * best.excess()) hopeless.clear();
+    best = exchanged(without_superfluous(next), hopeless);
     std::move(tried.begin(), tried.end(), std::back_inserter(tried_));
   }
   return best;
