@@ -189,8 +189,8 @@ Trial Selection::without_stand_in(const Trials& tried) {
 
 Trial Selection::best_set() {
   Trial best = baseline_;
-  Strings hopeless;  // laws with which alone the fit is worse than without: from that far away they are not found, and are not tried again before most of the way is gone
-  constexpr double most = 0.9;
+  Strings hopeless;  // laws with which alone the fit is worse than without: from that far away they are not found, and are not tried again before half of the way is gone
+  constexpr double half_way = 0.5;
   while (best.effects.size() < most_effects && !decays_decide(best) && locate_mismatch(best.arrival.joint).found) {
     tell(best.effects.empty() ? "trying what may be missing" : "trying what may be missing beside " + best.effects.back());
     Trials tried = try_one_more(best, hopeless);
@@ -200,7 +200,7 @@ Trial Selection::best_set() {
     const Trial next = without_stand_in(tried);
     if (!(best.effects.empty() || plausible(next)) || bic_difference(next, best) > -decisive) break;
     if (!leaves_nothing(next) && next.excess() > hardly_less * best.excess()) break;
-    if (next.excess() < (1 - most) * best.excess()) hopeless.clear();
+    if (next.excess() < half_way * best.excess()) hopeless.clear();
     best = exchanged(without_superfluous(next), hopeless);
     std::move(tried.begin(), tried.end(), std::back_inserter(tried_));
   }
