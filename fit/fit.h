@@ -51,6 +51,7 @@ struct FittedChannel {
 
 struct FittedRun {
   std::string file;
+  std::string fingerprint;  ///< of its readings (core/fingerprint.h)
   double onset_angle = 0;  ///< rad (RunConditions)
   Eigen::Index samples = 0;
   double chi2 = 0;

@@ -8,6 +8,7 @@
 #include <fmt/format.h>
 
 #include "core/error.h"
+#include "core/fingerprint.h"
 #include "core/simulate.h"
 #include "fit/coloured_noise.h"
 #include "fit/share_followed.h"
@@ -102,6 +103,7 @@ FittedRun describe_run(const RunResidual& residual, const VectorXd& theta, doubl
   const RunResidual::Prediction p = residual.predict(theta);
   FittedRun fitted;
   fitted.file = run.file;
+  fitted.fingerprint = fingerprint(run);
   fitted.onset_angle = residual.conditions().onset_angle;
   fitted.samples = run.samples();
   fitted.chi2 = chi2;

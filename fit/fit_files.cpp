@@ -9,6 +9,7 @@
 #include <nlohmann/json.hpp>
 
 #include "core/effects/effect.h"
+#include "core/fingerprint.h"
 #include "core/given_files.h"
 #include "core/text_file.h"
 #include "fit/fit_json.h"
@@ -117,7 +118,7 @@ std::string to_json(const FitResult& r) {
       channels.push_back({{"name", c.name}, {"unit", c.unit}, {"samples", c.samples}, {"missing", c.missing}, {"spikes", c.spikes},
                           {"rms_residual", number(c.rms_residual)}, {"noise", number(c.noise)}});
     const FittedChannel& first = run.channels.front();
-    out["runs"].push_back({{"file", run.file}, {"onset_angle", number(run.onset_angle)}, {"samples", run.samples}, {"rms_residual", number(first.rms_residual)}, {"noise", number(first.noise)},
+    out["runs"].push_back({{"file", run.file}, {"fingerprint", run.fingerprint}, {"onset_angle", number(run.onset_angle)}, {"samples", run.samples}, {"rms_residual", number(first.rms_residual)}, {"noise", number(first.noise)},
                            {"unit", first.unit}, {"reduced_chi2", number(run.reduced_chi2())}, {"whiteness", number(run.whiteness)}, {"explained", run.explained()},
                            {"followed", number(run.followed)}, {"channels", channels}});
   }
@@ -175,6 +176,7 @@ FittedRig read_fit(const json& in, const std::string& path) {
     }
     for (const json& run : in.value("runs", json::array())) {
       fit.runs.push_back(run.value("file", ""));
+      fit.fingerprints.push_back(run.value("fingerprint", ""));
       fit.onset_angles.push_back(run.contains("onset_angle") && run["onset_angle"].is_number() ? run["onset_angle"].get<double>() : std::nan(""));
     }
     return fit;
@@ -183,6 +185,11 @@ FittedRig read_fit(const json& in, const std::string& path) {
   } catch (const std::invalid_argument& e) {
     throw refuse(e.what());
   }
+}
+
+bool FittedRig::fitted(const Run& run) const {
+  const auto place = static_cast<std::size_t>(std::find(runs.begin(), runs.end(), recorded_as(run.file)) - runs.begin());
+  return place >= fingerprints.size() || fingerprints[place].empty() || fingerprints[place] == fingerprint(run);
 }
 
 std::string FittedRig::recorded_as(const std::string& run_file) const { return same_recording(runs, file, run_file); }

@@ -19,10 +19,13 @@ struct FittedRig {
   std::vector<FittedParameter> parameters;
   Eigen::MatrixXd correlation;
   std::vector<std::string> runs;
+  std::vector<std::string> fingerprints;  ///< of the runs (core/fingerprint.h), empty in a fit.json of an earlier version
   std::vector<double> onset_angles;  ///< rad, of the runs; not a number in a fit.json of an earlier version, empty in a fit made in code
 
   /// The recording that the fit knows this file as, empty if it took no part: the same path or file; by its name, and the folders that agree, only where the fit's own file is no longer there.
   std::string recorded_as(const std::string& run_file) const;
+  /// Whether this is the recording of its file that was fitted, as far as the fit says.
+  bool fitted(const Run& run) const;
   /// The value of a parameter, of this run (known likewise) where it has its own; `missing` where there is none.
   double value(const std::string& name, const std::string& run_file, double missing) const;
   const FittedParameter* find(const std::string& name, const std::string& run_file) const;

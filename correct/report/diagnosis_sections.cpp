@@ -232,7 +232,8 @@ std::optional<Models> read_models(ReportPage& page, const json& result, const st
 }
 
 /// The load cells and whatever else was fitted, without the angle, which both models follow.
-void add_models(ReportPage& page, const Models& models, const Run& run) {
+void add_models(ReportPage& page, const Models& models, const Run& run, const std::string& path) {
+  warn_of_another(page, models.after, run, path);
   const std::vector<FitTrace> after = fit_traces(models.rig, models.after, run);
   const std::vector<FitTrace> before = models.after.effects.empty() ? after : fit_traces(models.rig, models.before, run);
   const VectorXd time = VectorXd::LinSpaced(run.samples(), run.start, run.time(run.samples() - 1));
@@ -263,7 +264,7 @@ void add_run(ReportPage& page, const json& result, const json& run, const std::o
   if (!traces.empty())
     add_diagnosed_traces(page, read_trace(traces, text_of(traces, "unit").empty() ? text_of(run, "unit") : text_of(traces, "unit")), file);
   else if (recording)
-    add_models(page, *models, read_run(*recording));
+    add_models(page, *models, read_run(*recording), path);
   if (const json m = member(map, "time_frequency", json::object()); !m.empty()) add_time_frequency(page, m);
   if (const json m = member(map, "restoring_force", json::object()); !m.empty()) add_restoring_force(page, m);
 }

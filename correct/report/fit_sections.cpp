@@ -141,6 +141,7 @@ void add_fit(ReportPage& page, const json& result, const std::string& path, cons
       continue;
     }
     const Run run = read_run(*file);
+    warn_of_another(page, fit, run, path);
     add_traces(page, run, fit_traces(rig, fit, run));
   }
 }

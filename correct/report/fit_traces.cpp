@@ -1,9 +1,19 @@
 #include "correct/report/fit_traces.h"
 
+#include <fmt/format.h>
+
+#include "core/command.h"
 #include "core/wagner.h"
 #include "fit/run_residual.h"
 
 namespace unrig {
+
+void warn_of_another(ReportPage& page, const FittedRig& fit, const Run& run, const std::string& result) {
+  if (fit.fitted(run)) return;
+  const std::string text = fmt::format("The recording \"{}\" has other readings than the one that was fitted; its plots show what the fit makes of these. Fit it again, or say with --data where the old one is.", run.file);
+  warn(result + ": " + text);
+  page.add_text("Warning: " + text);
+}
 
 std::vector<FitTrace> fit_traces(const Rig& rig, const FittedRig& fit, const Run& run) {
   const Basis basis = rig.is_modal()          ? Basis{}

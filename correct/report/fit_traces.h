@@ -4,9 +4,13 @@
 
 #include "core/rig.h"
 #include "core/run.h"
+#include "correct/report/report_page.h"
 #include "fit/fit_files.h"
 
 namespace unrig {
+
+/// Says so on the page and to the user where the recording is not the one that was fitted, or has changed since: `result` is drawn beside it all the same.
+void warn_of_another(ReportPage& page, const FittedRig& fit, const Run& run, const std::string& result);
 
 /// A fitted channel of a run: what was recorded and what the model says, in SI.
 struct FitTrace {

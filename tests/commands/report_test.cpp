@@ -207,6 +207,26 @@ TEST(Report, SaysWhichRecordingsItDoesNotFindAndFindsThemInAFolder) {
   EXPECT_EQ(blocks(page_data(output), "plot").size(), 3u * 3 + 2);  // per run recording, residual, spectra; the step's angle twice more
 }
 
+TEST(Report, SaysWhereARecordingIsNotTheOneThatWasFitted) {
+  const TemporaryDirectory directory;
+  make_results(directory);
+  json fit = json::parse(read_text(directory.path("fit.json")));
+  const std::filesystem::path original = fit["runs"][0]["file"].get<std::string>();
+  const std::string name = original.filename().string(), output = directory.path("report.html");
+  std::string text = read_text(original.string());
+  directory.file(name, text);
+  fit["runs"][0]["file"] = directory.path(name);
+  const std::string moved = directory.file("moved.json", fit.dump());
+  EXPECT_THAT(run_unrig(directory, {"report", moved, "-o", output}).err, IsEmpty()) << "the same readings elsewhere";
+  const std::size_t last = text.find_last_of("123456789");
+  text[last] = text[last] == '1' ? '2' : '1';
+  directory.file(name, text);
+  const Finished changed = run_unrig(directory, {"report", moved, "-o", output});
+  EXPECT_EQ(changed.status, 0);
+  EXPECT_THAT(changed.err, HasSubstr(name + "\" has other readings"));
+  EXPECT_THAT(read_text(output), HasSubstr("has other readings"));
+}
+
 TEST(Report, RefusesWhatIsNoResult) {
   const TemporaryDirectory directory;
   json bad_diagnosis = made_up_diagnosis();
