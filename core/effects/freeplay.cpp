@@ -34,7 +34,7 @@ double rounded_gap(double z, const double* p, double& slope, double* partial) {
 }  // namespace
 
 /// A gap in the torsional drive: the elastic couple acts on the twist beyond the gap only, M = -k (theta - clamp(theta, -delta, delta)), theta the elastic twist [rad] of
-/// the section in the first torsional mode, delta half the gap [rad], k that mode's stiffness; a fit rounds the corners from 0.97 to 1.03 delta. The gap is centred where
+/// the section in the first torsional mode, delta half the gap [rad], k that mode's stiffness; a fit rounds the corners from 0.997 to 1.003 delta. The gap is centred where
 /// the rig stood before the run.
 /// Source: E. H. Dowell et al., A Modern Course in Aeroelasticity (2015), chapter 11.
 Effect freeplay() {

@@ -56,6 +56,9 @@ bool plausible(const Trial& trial) {
   });
 }
 
+/// What `trial` leaves above the noise of the runs by which `judged` is judged: its decays alone where these decide, since of the other runs more may be left while they are not followed.
+double excess_that_tells(const Trial& judged, const Trial& trial) { return decays_decide(judged) ? left_of_decays(trial) - 1 : trial.excess(); }
+
 bool any_leaves_nothing(const Trials& trials) { return std::any_of(trials.begin(), trials.end(), leaves_nothing); }
 
 /// All over again for those ahead, and for effects whose own fit has nothing to search in.
@@ -199,7 +202,7 @@ Trial Selection::best_set() {
     if (tried.empty()) break;
     const Trial next = without_stand_in(tried);
     if (!(best.effects.empty() || plausible(next)) || bic_difference(next, best) > -decisive) break;
-    if (!leaves_nothing(next) && next.excess() > hardly_less * best.excess()) break;
+    if (!leaves_nothing(next) && excess_that_tells(next, next) > hardly_less * excess_that_tells(next, best)) break;
     if (next.excess() < half_way * best.excess()) hopeless.clear();
     best = exchanged(without_superfluous(next), hopeless);
     std::move(tried.begin(), tried.end(), std::back_inserter(tried_));

@@ -11,6 +11,7 @@
 
 #include "core/csv_table.h"
 #include "core/error.h"
+#include "core/fingerprint.h"
 #include "core/text_file.h"
 #include "core/wagner.h"
 #include "correct/corrected_files.h"
@@ -196,6 +197,16 @@ TEST(Correct, SaysWhenTheRigOfTheFitDoesNotExplainTheReadings) {
     if (c.name == "gauge")
       for (Index k = 0; k < c.value.size(); ++k) c.value[k] += 0.3 * std::sin(2 * 3.14159265 * 11 * 0.002 * static_cast<double>(k));  // ten times the noise, at no frequency of the rig
   EXPECT_THAT(correct({null_rig(), null_fit(), step, 0}).warnings, testing::Contains(HasSubstr("unrig diagnose")));
+}
+
+TEST(Correct, SaysWhenARecordingIsNotTheOneOfTheFit) {
+  unrig::Run step = read_run(test::null_campaign("step_a.csv"));
+  FittedRig fit = null_fit();
+  fit.runs = {step.file};
+  fit.fingerprints = {fingerprint(step)};
+  EXPECT_THAT(correct({null_rig(), fit, step, 0}).warnings, testing::Not(testing::Contains(HasSubstr("other readings"))));
+  step.channels.back().value[100] += 0.001;
+  EXPECT_THAT(correct({null_rig(), fit, step, 0}).warnings, testing::Contains(HasSubstr("other readings")));
 }
 
 TEST(Correct, RefusesASectionThatDoesNotLoadTheGauge) {
