@@ -22,8 +22,8 @@ int fit_command(int argc, char** argv) {
   app.add_option("--rig", rig_path, "rig file (TOML)")->required();
   app.add_option("runs", run_paths, "run files (CSV): free decays and steps of this rig, in any number")->required();
   app.add_option("-o,--output", output, "result (JSON)")->required();
-  app.add_option("--effect", effect_ids, "physics beyond the rig model that is at work, one of those below (repeatable)");
-  app.add_option("--start", starts, "start value of a parameter, NAME=VALUE (repeatable)");
+  app.add_option("--effect", effect_ids, "physics beyond the rig model that is at work, one of those below (repeatable)")->allow_extra_args(false);
+  app.add_option("--start", starts, "start value of a parameter, NAME=VALUE (repeatable)")->allow_extra_args(false);
   CLI::Option* const profile = app.add_option("--profile", problem.profile, "profile-likelihood intervals (68 %, 95 %) of these parameters; without a name, of all that were fitted")->expected(0, -1);
   app.add_option("--wagner", circulation, "circulatory build-up: 1e-4, 1e-6 (largest error), jones, seed")->capture_default_str();
   app.add_option_function<int>("--threads", use_threads, "how many threads to work in; without it, as many as the machine has")->check(CLI::Range(1, 256));

@@ -183,7 +183,7 @@ int simulate_command(int argc, char** argv) {
   app.add_option("--indicial", options.indicial, "circulatory build-up, and the slope, from the table that `unrig correct --indicial` writes");
   app.add_option("--modes", options.normal_modes, "normal modes, in place of the rig file's or the fit's")->check(CLI::PositiveNumber);
   app.add_option("--torsion-modes", options.torsion_modes, "torsional modes, likewise")->check(CLI::PositiveNumber);
-  app.add_option("--set", options.settings, "name=value of a model parameter (formats as in fit.json), in SI; may be repeated");
+  app.add_option("--set", options.settings, "name=value of a model parameter (formats as in fit.json), in SI; may be repeated")->allow_extra_args(false);
   app.add_option("--release-load", options.release_load, "load at the calibration element that a pluck is released from, such as \"20 N\"");
   app.add_flag("--jumps", options.jumps, "the angle jumps from sample to sample: ideal steps, in place of a spline");
   app.add_flag("--as-recorded", options.as_recorded, "every reading of the angle as it is, its noise too; otherwise a measured angle is simulated as the smooth motion that it says");

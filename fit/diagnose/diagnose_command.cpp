@@ -33,8 +33,8 @@ int diagnose_command(int argc, char** argv) {
   std::vector<std::string> runs, heldout, ids;
   app.add_option("--rig", rig, "rig file (TOML)")->required();
   app.add_option("runs", runs, "run files (CSV) of this rig, in any number")->required();
-  app.add_option("--heldout", heldout, "run that is not fitted but predicted (repeatable)");
-  app.add_option("--effects", ids, "candidates, separated by commas; without it, all that can act in these runs")->delimiter(',');
+  app.add_option("--heldout", heldout, "run that is not fitted but predicted (repeatable)")->allow_extra_args(false);
+  app.add_option("--effects", ids, "candidates, separated by commas; without it, all that can act in these runs")->delimiter(',')->allow_extra_args(false);
   app.add_option_function<int>("--threads", use_threads, "how many threads to work in; without it, as many as the machine has")->check(CLI::Range(1, 256));
   app.add_option("--fit", fit_output, "writes the winning fit too (fit.json), for simulate and correct");
   app.add_option("-o,--output", output, "result (JSON)")->required();

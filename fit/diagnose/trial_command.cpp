@@ -21,7 +21,7 @@ int trial_command(int argc, char** argv) {
   std::vector<std::string> ids, recordings;
   app.add_option("--rig", rig, "rig file (TOML)")->required();
   app.add_option("runs", recordings, "recordings (CSV) that the simulated runs repeat: their conditions, motion, release, sampling and noise; without any, two plucks and three steps are drawn");
-  app.add_option("--effects", ids, "effects to hide in turn, and the candidates, separated by commas; without it, all")->delimiter(',');
+  app.add_option("--effects", ids, "effects to hide in turn, and the candidates, separated by commas; without it, all")->delimiter(',')->allow_extra_args(false);
   app.add_option("--trials", problem.trials, "campaigns; every so many-th hides nothing")->capture_default_str()->check(CLI::Range(1, 1000000));
   app.add_flag("--pairs", problem.pairs, "hide two effects at a time");
   app.add_option("--seed", problem.seed, "of the random numbers")->capture_default_str();

@@ -111,6 +111,15 @@ TEST(FitOptions, StartValuesAreReportedAsTheyWereGiven) {
   EXPECT_EQ(fit["parameters"][1]["start"], 1700);
 }
 
+TEST(FitOptions, MayStandBeforeTheRuns) {
+  const TemporaryDirectory directory;
+  const std::string run = decay(directory), rig = rig_file(directory);
+  const Finished fitted = run_unrig(directory, {"fit", "--rig", rig, "--start", "modal[1].damping=1", run, "-o", directory.path("fit.json")});
+  EXPECT_EQ(fitted.status, 0) << fitted.err;
+  const Finished diagnosed = run_unrig(directory, {"diagnose", "--rig", rig, "--heldout", decay(directory), "--effects", "mains-hum,cubic-stiffness", run, "-o", directory.path("diagnosis.json")});
+  EXPECT_THAT(diagnosed.err, HasSubstr("--heldout is among the runs too")) << "one value each; the rest are runs";
+}
+
 TEST(FitOptions, AnEffectThatIsNamedTwiceActsOnce) {
   const TemporaryDirectory directory;
   const std::string run = decay(directory);
