@@ -52,19 +52,19 @@ Run beginning_of(Run run, Index samples) {
   return run;
 }
 
-/// How many samples are enough to begin a search with: as many as see the shaft move as the whole record does.
+/// How many samples are enough to begin a search with: as many as the shaft moves in as it does in the whole record, by the mean square of its changes over some thousand samples.
 Index enough_to_begin_with(const Run& run) {
-  constexpr Index few = 1 << 15;
-  constexpr double alike = 0.5;
+  constexpr Index few = 1 << 15, lag = 1 << 10;
+  constexpr double alike = 0.25;
   const VectorXd& alpha = run.channel("alpha").value;
-  const auto scatter = [&](Index samples) {
-    double sum = 0, squares = 0, count = 0;
-    for (Index k = 0; k < samples; ++k)
-      if (std::isfinite(alpha[k])) sum += alpha[k] - alpha[0], squares += std::pow(alpha[k] - alpha[0], 2), count += 1;
-    return squares / count - std::pow(sum / count, 2);
+  const auto changes = [&](Index samples) {
+    double squares = 0, count = 1;
+    for (Index k = lag; k < samples; ++k)
+      if (const double change = alpha[k] - alpha[k - lag]; std::isfinite(change)) squares += change * change, count += 1;
+    return squares / count;
   };
   Index samples = few;
-  while (2 * samples < run.samples() && !(scatter(samples) > alike * alike * scatter(run.samples()))) samples *= 2;
+  while (2 * samples < run.samples() && !(changes(samples) > alike * changes(run.samples()))) samples *= 2;
   return 2 * samples < run.samples() ? samples : run.samples();
 }
 
