@@ -4,6 +4,7 @@
 #include <cmath>
 #include <iterator>
 #include <memory>
+#include <optional>
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
@@ -190,24 +191,40 @@ Trial Selection::without_stand_in(const Trials& tried) {
   return alone;
 }
 
+/// A law is not found from far away where the rig's modes are too few for its trajectory: where nothing explains what is missing, every effect is tried beside the modes that were left out too.
+void Selection::try_with_all_modes(Trials& tried) {
+  if (any_leaves_nothing(tried) || baseline_.reduced_chi2() < nearly_explained) return;
+  const auto modes = std::find_if(tried.begin(), tried.end(), [](const Trial& t) { return t.effects == Strings{"higher-mode"}; });
+  if (modes == tried.end()) return;
+  tell("trying what may be missing beside higher-mode");
+  const Trial base = *modes;
+  for (Trial& t : try_one_more(base, {}))
+    if (bic_difference(t, base) < -decisive) tried.push_back(std::move(t));
+  std::sort(tried.begin(), tried.end(), [](const Trial& a, const Trial& b) { return bic_difference(a, b) < 0; });
+  std::stable_partition(tried.begin(), tried.end(), plausible);
+}
+
 Trial Selection::best_set() {
   Trial best = baseline_;
+  std::optional<Trial> sufficient;  // a law that is followed all but exactly: what it leaves has a name only where that leaves nothing
   Strings hopeless;  // laws with which alone the fit is worse than without: from that far away they are not found, and are not tried again before half of the way is gone
   constexpr double half_way = 0.5;
   while (best.effects.size() < most_effects && !decays_decide(best) && locate_mismatch(best.arrival.joint).found) {
+    if (!sufficient && leaves_nothing(best) && nonlinear(best)) sufficient = best;
     tell(best.effects.empty() ? "trying what may be missing" : "trying what may be missing beside " + best.effects.back());
     Trials tried = try_one_more(best, hopeless);
     for (const Trial& t : tried)
       if (best.effects.empty() && brings_a_law(t) && bic_difference(t, baseline_) > decisive) hopeless.push_back(t.effects.back());
+    if (best.effects.empty()) try_with_all_modes(tried);
+    std::erase_if(tried, [&](const Trial& t) { return !leaves_nothing(t) && excess_that_tells(t, t) > hardly_less * excess_that_tells(t, best); });
     if (tried.empty()) break;
     const Trial next = without_stand_in(tried);
     if (!(best.effects.empty() || plausible(next)) || bic_difference(next, best) > -decisive) break;
-    if (!leaves_nothing(next) && excess_that_tells(next, next) > hardly_less * excess_that_tells(next, best)) break;
     if (next.excess() < half_way * best.excess()) hopeless.clear();
     best = exchanged(without_superfluous(next), hopeless);
     std::move(tried.begin(), tried.end(), std::back_inserter(tried_));
   }
-  return best;
+  return sufficient && locate_mismatch(best.arrival.joint).found ? *sufficient : best;
 }
 
 /// Probabilities: exp(-BIC/2) over the sum of it over all.

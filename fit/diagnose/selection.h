@@ -28,6 +28,7 @@ class Selection {
   std::vector<std::string> candidates(const std::vector<std::string>& at_work, const std::vector<std::string>& hopeless) const;
   std::vector<Trial> try_one_more(const Trial& base, const std::vector<std::string>& hopeless);
   Trial without_superfluous(Trial trial) const;
+  void try_with_all_modes(std::vector<Trial>& tried);
   Trial without_stand_in(const std::vector<Trial>& tried);
   Trial exchanged(Trial trial, const std::vector<std::string>& hopeless);
   void tell(const std::string& what) const {
