@@ -19,7 +19,7 @@ namespace unrig {
 ///
 /// The second part varies with i - j as cubic splines through one value every near / 256 samples do, and costs next to nothing: x is weighed onto these nodes, and y interpolated from them. It is
 /// off by (near / 256)^4 / 192 of the fourth derivative of u h, for u itself 5e-8 where it bends most. Cost n ln(near), memory besides records and sums that of a piece of 8 near. Rounding is that of the largest y, 1e-15 of it.
-/// Throws std::invalid_argument for records or kernels of another length.
+/// Records and kernels have these lengths and `near` is a power of two: that is for the caller to see to, but for what throws std::invalid_argument: kernels and whole records of another length.
 class Convolution {
  public:
   /// `near` 0: in one piece. Otherwise a power of two from 512 on.

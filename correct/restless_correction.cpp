@@ -53,18 +53,23 @@ Run beginning_of(Run run, Index samples) {
 }
 
 /// How many samples are enough to begin a search with: as many as the shaft moves in as it does in the whole record, by the mean square of its changes over some thousand samples.
-Index enough_to_begin_with(const Run& run) {
+Index enough_to_begin_with(const Run& run, std::vector<std::string> channels) {
   constexpr Index few = 1 << 15, lag = 1 << 10;
   constexpr double alike = 0.25;
   const VectorXd& alpha = run.channel("alpha").value;
+  channels.emplace_back("alpha");
   const auto changes = [&](Index samples) {
     double squares = 0, count = 1;
     for (Index k = lag; k < samples; ++k)
       if (const double change = alpha[k] - alpha[k - lag]; std::isfinite(change)) squares += change * change, count += 1;
     return squares / count;
   };
+  const auto read = [&](Index samples) {  // every channel has readings there
+    return std::all_of(channels.begin(), channels.end(), [&](const std::string& name) { return noise_level(run.channel(name).value.head(samples)) > 0; });
+  };
+  const double whole = changes(run.samples());
   Index samples = few;
-  while (2 * samples < run.samples() && !(changes(samples) > alike * changes(run.samples()))) samples *= 2;
+  while (2 * samples < run.samples() && !(changes(samples) > alike * whole && read(samples))) samples *= 2;
   return 2 * samples < run.samples() ? samples : run.samples();
 }
 
@@ -74,7 +79,7 @@ Search estimate(RestlessRun& run, const AeroelasticModel& model, const RestlessP
   constexpr double roughly = 10, well = 1e-2;  // of a chi-square whose own scatter is some hundreds
   VectorXd theta = problem.start;
   Prior prior = problem.prior;
-  const Run first = beginning_of(problem.run, enough_to_begin_with(problem.run));
+  const Run first = beginning_of(problem.run, enough_to_begin_with(problem.run, model.output_channels(problem.run)));
   const bool in_parts = first.samples() < problem.run.samples();
   std::optional<RestlessRun> beginning;
   if (in_parts) beginning.emplace(model, first);
@@ -86,6 +91,7 @@ Search estimate(RestlessRun& run, const AeroelasticModel& model, const RestlessP
     const Search search = minimise(searched(part, model, prior), prior, theta, well, true);
     theta = search.solution.theta;
     prior.amplitude = search.prior.amplitude;
+    if (!std::isfinite(run.solve(theta).chi2)) theta = problem.start;  // it grows too slowly to be seen in a part
     run.settle_noise(theta);  // before it is held to the roughness of a part: where the motion is rougher elsewhere, its readings would be taken for spikes
     run.take_roughness_of(part);
     run.settle_roughness(theta, RestlessRun::Look::near);

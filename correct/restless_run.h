@@ -29,7 +29,8 @@ namespace unrig {
 /// the estimated motion is, are looked at on every few samples (`looked`) where squares of them are summed; what they have in common with the readings is summed over all.
 ///
 /// The shaft is taken to have been on its way before the first sample, as uncertain there as later for given past, and the section is steady there. Missing samples are filled with the
-/// smoother's own estimate, which is exact for the estimate and leaves the band as if they were there.
+/// smoother's own estimate, again and again (twelve times at most) until that changes nothing by a tenth of the noise, and leave the band as if they were there. Where both channels are missing for
+/// some dozens of samples it converges too slowly: something of the straight line over the gap remains.
 class RestlessRun {
  public:
   /// Records of more samples than `in_one_piece` are taken piece by piece.

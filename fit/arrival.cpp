@@ -331,6 +331,7 @@ Arrival extend(const FitProblem& problem, const Arrival& without, const std::sha
   for (std::size_t r = 0; r < arrival.joint.runs().size(); ++r) {
     arrival.joint.runs()[r].keep_noise_of(without.joint.runs()[r]);
     arrival.joint.runs()[r].start_from(without.joint.runs()[r]);
+    arrival.joint.runs()[r].follow_in(without.joint.runs()[r].finer());
   }
   for (RunResidual& run : arrival.joint.runs()) run.glance(true);
   choose_effect_starts(arrival, problem, added);

@@ -227,6 +227,11 @@ void fit_fully(Trial& trial, int rounds) {
   measure(trial);
 }
 
+void follow_finer(Trial& trial, Index times) {
+  for (RunResidual& run : trial.arrival.joint.runs()) run.follow_in(times);
+  fit_fully(trial, 2);
+}
+
 double left_of_decays(const Trial& trial) {
   double power = 0, count = 0;
   for (std::size_t r = 0; r < trial.variance.size(); ++r) {

@@ -67,6 +67,9 @@ Arrival arrive_at_effects(const FitProblem& problem);
 /// Fits a prepared trial with everything free, while the weights of the runs return to those of their noise, in so many rounds.
 void fit_fully(Trial& trial, int rounds);
 
+/// Follows its nonlinear laws in so many times the steps that they ask for, and fits again.
+void follow_finer(Trial& trial, Eigen::Index times);
+
 /// The same all over again from first guesses, with windows that grow from a few periods: for effects without which the rig's parameters go far astray. Keeps the better.
 void fit_from_first_guesses(const FitProblem& problem, Trial& trial);
 

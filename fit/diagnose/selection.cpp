@@ -79,6 +79,15 @@ void fit_others_anew(const FitProblem& problem, Trials& trials) {
   });
 }
 
+/// With a law at work that leaves something: the same followed in finer steps, where that leaves less. What coarse steps make of a sharp law is no effect.
+Trial in_finer_steps(Trial trial) {
+  constexpr Eigen::Index finer = 4;
+  if (trial.effects.empty() || !nonlinear(trial) || decays_decide(trial) || trial.arrival.joint.runs().front().finer() >= finer) return trial;
+  Trial again = trial;
+  follow_finer(again, finer);
+  return bic_difference(again, trial) < 0 ? again : trial;
+}
+
 }  // namespace
 
 Selection::Selection(const DiagnoseProblem& problem, const FitProblem& fit_problem, const Trial& baseline) : problem_(problem), fit_problem_(fit_problem), baseline_(baseline) {
@@ -210,7 +219,9 @@ Trial Selection::best_set() {
   Strings hopeless;  // laws with which alone the fit is worse than without: from that far away they are not found, and are not tried again before half of the way is gone
   constexpr double half_way = 0.5;
   while (best.effects.size() < most_effects && !decays_decide(best) && locate_mismatch(best.arrival.joint).found) {
-    if (!sufficient && leaves_nothing(best) && nonlinear(best)) sufficient = best;
+    best = in_finer_steps(std::move(best));
+    if (!locate_mismatch(best.arrival.joint).found) break;
+    if (!sufficient && nonlinear(best) && best.excess() < (1 - enough_to_name) * baseline_.excess() && leaves_nothing(best)) sufficient = best;
     tell(best.effects.empty() ? "trying what may be missing" : "trying what may be missing beside " + best.effects.back());
     Trials tried = try_one_more(best, hopeless);
     for (const Trial& t : tried)

@@ -2,7 +2,7 @@
 
 namespace unrig {
 
-/// `unrig trial --rig rig.toml [--effects a,b,...] [--trials N] [--seed S] [--noise "0.03 N"] -o trial.json`
+/// `unrig trial --rig rig.toml [RUN...] [--effects a,b,...] [--trials N] [--seed S] [--noise "0.03 N"] -o trial.json`
 int trial_command(int argc, char** argv);
 
 }  // namespace unrig

@@ -82,14 +82,17 @@ VectorXd beside_noise(const VectorXd& recorded, const VectorXd& truth, double no
   return beside;
 }
 
-/// What the gauge begins with, above where it ends: under a load at the calibration element it reads that load.
+/// What the gauge begins with, above the mean of the record: under a load at the calibration element it reads that load. The middle of the first five readings, so that a spike is none.
 double release_load(const VectorXd& gauge) {
   std::vector<double> there;
   for (const double reading : gauge)
     if (std::isfinite(reading)) there.push_back(reading);
-  const VectorXd reading = VectorXd::Map(there.data(), static_cast<Index>(there.size()));
-  const Index part = std::max<Index>(1, reading.size() / 10);
-  return (reading.head(part).array() - reading.tail(part).mean()).abs().maxCoeff();
+  if (there.empty()) return 0;
+  const double mean = VectorXd::Map(there.data(), static_cast<Index>(there.size())).mean();
+  there.resize(std::min<std::size_t>(5, there.size()));
+  const auto middle = there.begin() + static_cast<std::ptrdiff_t>(there.size() / 2);
+  std::nth_element(there.begin(), middle, there.end());
+  return std::abs(*middle - mean);
 }
 
 void move_like(const Rig& rig, const Run& recording, PlannedRun& planned) {

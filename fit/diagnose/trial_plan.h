@@ -26,7 +26,8 @@ struct PlannedRun {
 std::vector<PlannedRun> draw_runs(double noise, std::mt19937_64& random);
 
 /// The same conditions, durations and sampling as in recordings, moved and released as there: the shaft's angle is the motion that the recorded one says (fit/shaft_motion.h), the release load what
-/// the gauge begins with. Their noises, unless `noise` sets that of the gauge, spikes and missing samples; lift slopes are drawn, one for angles of attack below 12 degrees and one for each
+/// the gauge begins with. The white part of their noises (unless `noise` sets that of the gauge), spikes of the angle and missing samples of a step; the angle of a pluck is nought with a noise of
+/// 0.01 degrees. Sensors, weights and coloured noise are not repeated. Lift slopes are drawn, one for angles of attack below 12 degrees and one for each
 /// run beyond.
 ///
 /// Throws InputError for a run that is neither pluck nor step, has no gauge in newtons, or whose shaft never rests: its motion is not told from the noise of its angle.

@@ -75,6 +75,8 @@ TEST(TrialCampaign, RepeatsRecordings) {
   EXPECT_NEAR(apart, std::sqrt(2.0) * planned[2].angle_noise, 0.1 * planned[2].angle_noise) << "the same motion, spikes included; two draws of the noise";
   EXPECT_GT(planned[2].slope, 2.5);
   EXPECT_LT(planned[2].slope, 0.7 * 2 * 3.1416) << "stalled at 25 degrees";
+  const unrig::Run wet = read_run(test::null_campaign("wet_pluck.csv"));
+  EXPECT_NEAR(runs_like(rig, {wet}, {}, random).front().release, wet.channel("gauge").value[0], 0.03 * wet.channel("gauge").value[0]) << "swings about nought: the mean of some periods is left, and the noise";
   const auto swing = [](const Eigen::VectorXd& gauge) { return gauge.head(200).maxCoeff() - gauge.head(200).minCoeff(); };
   EXPECT_NEAR(swing(campaign.runs[0].channel("gauge").value) / swing(recordings[0].channel("gauge").value), 1, 0.1) << "released from the same load; frequencies and damping differ";
 }
