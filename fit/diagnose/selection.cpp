@@ -79,13 +79,14 @@ void fit_others_anew(const FitProblem& problem, Trials& trials) {
   });
 }
 
-/// With a law at work that leaves something: the same followed in finer steps, where that leaves less. What coarse steps make of a sharp law is no effect.
+/// With a law at work that leaves something near the noise: the same followed in finer steps, where these leave less than half of it. What coarse steps make of a sharp law is no effect; where they are
+/// not what is missing, they would only make everything after it dearer.
 Trial in_finer_steps(Trial trial) {
   constexpr Eigen::Index finer = 4;
-  if (trial.effects.empty() || !nonlinear(trial) || decays_decide(trial) || trial.arrival.joint.runs().front().finer() >= finer) return trial;
+  if (trial.effects.empty() || !nonlinear(trial) || decays_decide(trial) || trial.reduced_chi2() > nearly_explained || trial.arrival.joint.runs().front().finer() >= finer) return trial;
   Trial again = trial;
   follow_finer(again, finer);
-  return bic_difference(again, trial) < 0 ? again : trial;
+  return again.excess() < 0.5 * trial.excess() ? again : trial;
 }
 
 }  // namespace
