@@ -10,6 +10,7 @@
 #include <fmt/format.h>
 
 #include "core/in_parallel.h"
+#include "core/smooth_ramp.h"
 
 namespace unrig {
 
@@ -31,12 +32,6 @@ Index quick_length(Index least) {
     for (Index length = odd; length < best; length *= 2)
       if (length >= least && length % 2 == 0) best = length;
   return best;
-}
-
-/// u over 0 <= x <= 1.
-double ramp(double x) {
-  x = std::clamp(x, 0.0, 1.0);
-  return x * x * x * x * (35 + x * (-84 + x * (70 - 20 * x)));
 }
 
 /// Cubic B-splines of the four nodes around a sample, by its distance from the second of them.
@@ -97,7 +92,7 @@ Convolution::Convolution(Index samples, Index near) : samples_(samples), near_(n
 Convolution::Kernel Convolution::kernel(const VectorXd& near, const VectorXd& far) const {
   if (near.size() != near_ || far.size() != far_) throw std::invalid_argument(fmt::format("a kernel of {} and {} samples, not of {} and {}", near.size(), far.size(), near_, far_));
   if (stride_ == 0) return {plan_->forward(near), {}};
-  const auto u = [&](Index i) { return ramp(static_cast<double>(i - half()) / static_cast<double>(half())); };
+  const auto u = [&](Index i) { return smooth_ramp(static_cast<double>(i - half()) / static_cast<double>(half())); };
   VectorXd fine = near;
   for (Index i = half(); i < near_; ++i) fine[i] *= 1 - u(i);
   VectorXd coarse = VectorXd::Zero(half() / stride_ + far_);

@@ -290,18 +290,16 @@ class Follower {
   bool straight_over(Index k) const { return per_sample_ > 1 && (slope_.middleCols(k + 1, per_sample_).colwise() - slope_.col(k)).isZero(0); }
 
   /// What the steps of a sample do to [x; df; djerk] while the laws have these slopes, and what is read at its beginning: a law of straight pieces (a gap) has few.
-  const MatrixXd& straight_step(const VectorXd& slope) {
+  const MatrixXd& straight_step(const Few<M>& slope) {
     for (const StraightStep& known : straight_)
       if (known.slope == slope) return known.over_sample;
     constexpr std::size_t most = 8;
     if (straight_.size() == most) straight_.erase(straight_.begin());
     const Index n = one_.states, m = one_.feedbacks, size = one_.input();
-    const Few<M> s = slope;
-    const FewSquare<M> answer = s.asDiagonal() * inverse(FewSquare<M>::Identity(m, m) - gain_ * s.asDiagonal());
-    MatrixXd step = MatrixXd::Identity(size, size), all = step;
-    step.middleRows(n, m) = answer * one_.step.block(n, 0, m, size);
+    MatrixXd step = MatrixXd::Identity(size, size);
+    step.middleRows(n, m) = answer_of(slope) * one_.step.block(n, 0, m, size);
     step.topRows(n) = one_.step.topLeftCorner(n, size) + one_.late.topRows(n) * step.middleRows(n, m);
-    for (Index i = 0; i < per_sample_; ++i) all = step * all;
+    const MatrixXd all = power(step, per_sample_);
     MatrixXd over_sample = MatrixXd::Zero(one_.rows(), size);
     over_sample.topRows(n + m) = all.topRows(n + m);
     over_sample.middleRows(one_.output(), one_.channels) = one_.step.block(one_.output(), 0, one_.channels, size);
@@ -312,12 +310,18 @@ class Follower {
   /// Puts the change of the force where that of its argument stands, and adds what it does to the state, in columns `from` on.
   void feed_back(const Few<M>& slope, Index from) {
     const Index n = one_.states, m = one_.feedbacks;
-    const FewSquare<M> answer = slope.asDiagonal() * inverse(FewSquare<M>::Identity(m, m) - gain_ * slope.asDiagonal());
+    const FewSquare<M> answer = answer_of(slope);
     for (Index j = from; j < columns_; ++j) {
       const Few<M> force = answer.lazyProduct(next_.col(j).segment(n, m));
       for (Index i = 0; i < m; ++i) next_.col(j).head(n) += force[i] * one_.late.col(i).head(n);
       next_.col(j).segment(one_.force(), m) = force;
     }
+  }
+
+  /// How the force at the end of a step answers to what the laws see there without it.
+  FewSquare<M> answer_of(const Few<M>& slope) const {
+    const Index m = one_.feedbacks;
+    return slope.asDiagonal() * inverse(FewSquare<M>::Identity(m, m) - gain_ * slope.asDiagonal());
   }
 
   static FewSquare<M> inverse(const FewSquare<M>& matrix) {
@@ -338,7 +342,7 @@ class Follower {
   MatrixXd now_, slope_, law_partial_, source_, tangent_, next_;
   VectorXd stepped_, largest_;
   struct StraightStep {
-    VectorXd slope;
+    Few<M> slope;
     MatrixXd over_sample;  // rows x [x; f; jerk]
   };
   std::vector<StraightStep> straight_;

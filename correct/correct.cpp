@@ -200,8 +200,8 @@ void describe_run(const CorrectProblem& problem, CorrectResult& result) {
   result.calibration_uncertainty = problem.calibration_uncertainty > 0 ? problem.calibration_uncertainty : rig.calibration_uncertainty;
   result.imposed = problem.imposed;
   result.warnings = run.warnings;
-  if (!problem.fit.fitted(run))
-    result.warnings.push_back(fmt::format("{}: other readings than those that {} was fitted to; the band takes them for the fitted ones. Fit again, or give the new recording another name.", run.file, problem.fit.file));
+  if (problem.fit.had_other_readings(run))
+    result.warnings.push_back(fmt::format("{}: other readings or conditions than those that {} was fitted to; the band takes them for the fitted ones. Fit again, or give the new recording another name.", run.file, problem.fit.file));
 }
 
 /// Behind shorter ones the slope of a step of `sample_data/campaigns/null` that was cut was three of its standard deviations off and more; from 3.2 on one at most.

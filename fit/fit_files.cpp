@@ -187,9 +187,9 @@ FittedRig read_fit(const json& in, const std::string& path) {
   }
 }
 
-bool FittedRig::fitted(const Run& run) const {
+bool FittedRig::had_other_readings(const Run& run) const {
   const auto place = static_cast<std::size_t>(std::find(runs.begin(), runs.end(), recorded_as(run.file)) - runs.begin());
-  return place >= fingerprints.size() || fingerprints[place].empty() || fingerprints[place] == fingerprint(run);
+  return place < fingerprints.size() && !fingerprints[place].empty() && fingerprints[place] != fingerprint(run);
 }
 
 std::string FittedRig::recorded_as(const std::string& run_file) const { return same_recording(runs, file, run_file); }

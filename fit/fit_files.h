@@ -24,8 +24,8 @@ struct FittedRig {
 
   /// The recording that the fit knows this file as, empty if it took no part: the same path or file; by its name, and the folders that agree, only where the fit's own file is no longer there.
   std::string recorded_as(const std::string& run_file) const;
-  /// Whether this is the recording of its file that was fitted, as far as the fit says.
-  bool fitted(const Run& run) const;
+  /// Whether the fit knows this recording's file with other readings or conditions. False for a file that took no part, and where the fit does not say.
+  bool had_other_readings(const Run& run) const;
   /// The value of a parameter, of this run (known likewise) where it has its own; `missing` where there is none.
   double value(const std::string& name, const std::string& run_file, double missing) const;
   const FittedParameter* find(const std::string& name, const std::string& run_file) const;

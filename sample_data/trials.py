@@ -55,7 +55,8 @@ def main():
     nulls, hidden = [t for t in trials if not t["hidden"]], [t for t in trials if t["hidden"]]
     visible = [t for t in hidden if size(t) >= VISIBLE]
     kinds = collections.Counter(kind(t) for t in visible)
-    print(f"{len(trials)} campaigns (seeds {', '.join(str(r['seed']) for r in results)}), noise {results[0]['noise']['gauge']:.3g} {results[0]['noise']['unit']}\n")
+    noise = sorted({f"{r['noise']['gauge']:.3g} {r['noise']['unit']}" for r in results})
+    print(f"{len(trials)} campaigns (seeds {', '.join(str(r['seed']) for r in results)}), noise {', '.join(noise)}\n")
     print(f"- nothing hidden: {share(sum(not t['right'] or t['unexplained'] for t in nulls), len(nulls))} false alarms")
     print(f"- something hidden, size {VISIBLE} or more: " + "; ".join(f"{k} {share(kinds[k], len(visible))}" for k in ("right", "as good", "one of two", "wrong", "unexplained", "missed", "failed") if kinds[k]))
     seconds = sorted(t["seconds"] for t in trials)

@@ -9,8 +9,8 @@
 namespace unrig {
 
 void warn_of_another(ReportPage& page, const FittedRig& fit, const Run& run, const std::string& result) {
-  if (fit.fitted(run)) return;
-  const std::string text = fmt::format("The recording \"{}\" has other readings than the one that was fitted; its plots show what the fit makes of these. Fit it again, or say with --data where the old one is.", run.file);
+  if (!fit.had_other_readings(run)) return;
+  const std::string text = fmt::format("The recording \"{}\" has other readings or conditions than the one that was fitted; its plots show what the fit makes of these. Fit it again, or say with --data where the old one is.", run.file);
   warn(result + ": " + text);
   page.add_text("Warning: " + text);
 }

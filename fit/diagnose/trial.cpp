@@ -98,6 +98,10 @@ void tally(TrialResult& result, const Strings& effects) {
   for (const TrialOutcome& o : result.outcomes) {
     const std::string found = !o.failure.empty() ? "failed" : o.found.empty() && o.unexplained ? "unexplained" : name_of(o.found);
     ++result.confusion[name_of(o.hidden)][found];
+    if (!o.failure.empty()) {
+      ++result.failures;
+      continue;
+    }
     if (o.hidden.empty()) {
       ++result.nulls;
       if (!o.found.empty() || o.unexplained) ++result.false_alarms;
@@ -169,7 +173,7 @@ std::string to_json(const TrialResult& r) {
 std::string report(const TrialResult& r) {
   const std::string like = r.recordings.empty() ? "" : fmt::format(", runs like {}", fmt::join(r.recordings, ", "));
   std::string text = fmt::format("{} trials, seed {}, noise {:.4g} N{}: {} false alarms in {} campaigns with nothing hidden\n", r.outcomes.size(), r.seed, r.noise, like, r.false_alarms, r.nulls);
-  text += fmt::format("    of {} with something hidden {} named an effect that was not there, {} named nothing\n", r.outcomes.size() - static_cast<std::size_t>(r.nulls), r.wrong_names, r.misses);
+  text += fmt::format("    of {} with something hidden {} named an effect that was not there, {} named nothing\n", static_cast<int>(r.outcomes.size()) - r.nulls - r.failures, r.wrong_names, r.misses);
   text += "[[Hidden -> found]]\n";
   for (const auto& [hidden, row] : r.confusion)
     for (const auto& [found, count] : row) text += fmt::format("    {:<36} {:<36} {:4}\n", hidden, found, count);

@@ -51,6 +51,7 @@ struct TrialResult {
   std::map<std::string, EffectScore> scores;
   int nulls = 0, false_alarms = 0;    ///< campaigns with nothing hidden, and those of them where something was named
   int wrong_names = 0, misses = 0;    ///< with something hidden: an effect was named that was not there; nothing was named
+  int failures = 0;                   ///< campaigns that could not be drawn or diagnosed: in none of these counts
   unsigned seed = 0;
   std::vector<std::string> recordings;  ///< files that the simulated runs repeat
   double noise = 0;                     ///< of the gauge [N]; of several recordings the largest

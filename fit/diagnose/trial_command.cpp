@@ -55,6 +55,7 @@ int trial_command(int argc, char** argv) {
   progress.clear();
   write_text(output, to_json(result));
   fmt::print("{}", report(result));
+  if (result.failures == problem.trials) throw NoAnswer("no campaign could be diagnosed: " + result.outcomes.front().failure);
   return exit_done;
 }
 

@@ -9,6 +9,7 @@
 
 #include "core/error.h"
 #include "core/motion.h"
+#include "core/smooth_ramp.h"
 #include "fit/run_residual.h"
 #include "fit/shaft_motion.h"
 
@@ -112,12 +113,6 @@ void move_like(const Rig& rig, const Run& recording, PlannedRun& planned) {
 
 double between(Random& random, double low, double high) { return std::uniform_real_distribution<double>(low, high)(random); }
 double log_between(Random& random, double low, double high) { return std::exp(between(random, std::log(low), std::log(high))); }
-
-double smooth_ramp(double x) {
-  if (x <= 0) return 0;
-  if (x >= 1) return 1;
-  return x * x * x * x * (35 + x * (-84 + x * (70 - 20 * x)));
-}
 
 Run every_nth(const Run& fine, Index n) {
   Run run = fine;

@@ -40,7 +40,4 @@ double log_between(std::mt19937_64& random, double low, double high);
 /// Every n-th sample.
 Run every_nth(const Run& fine, Eigen::Index n);
 
-/// From 0 to 1 in 0 <= x <= 1 with three derivatives at rest at either end.
-double smooth_ramp(double x);
-
 }  // namespace unrig

@@ -182,22 +182,28 @@ TEST(Restless, ANonlinearForceIsRefusedWithAdvice) {
   }
 }
 
+/// Both loads of a shaft that never rests.
+void expect_found_within_its_band(const CorrectResult& result, const Recorded& r) {
+  for (const bool circulatory : {true, false}) {
+    const CorrectedLoad& load = circulatory ? result.circulatory : result.normal_force;
+    const VectorXd& truth = circulatory ? r.circulatory : r.normal_force;
+    const VectorXd off = load.value - truth, in_deviations = off.cwiseAbs().cwiseQuotient(load.std);
+    // 0.001 and 0.003 of the range measured; the rest is a margin for another draw of the noise.
+    EXPECT_LT(rms(off), (circulatory ? 0.0015 : 0.005) * (truth.maxCoeff() - truth.minCoeff()));
+    const Index tenth = off.size() / 10;
+    for (Index i = 0; i < 10; ++i) EXPECT_GT((in_deviations.segment(i * tenth, tenth).array() < 1.96).cast<double>().mean(), 0.85) << i;
+    EXPECT_LT(in_deviations.maxCoeff(), load.simultaneous + 1) << "the whole curve: 95 % of such records stay below the first";
+    EXPECT_GT(in_deviations.mean(), 0.4) << "0.8 for errors as large as their band says: no band that is wide for nothing";
+    EXPECT_LT((load.by_source.rowwise().norm() - load.std).cwiseAbs().maxCoeff(), 1e-12);
+  }
+}
+
 TEST(Restless, LoadIsFoundInTimeThatGoesWithTheRecord) {
   for (double (*const motion)(double) : {&sine, &many_frequencies}) {
     constexpr Index samples = 10000;
     const Recorded r = record(motion, samples);
     const CorrectResult result = correct({test::null_rig(), test::null_fit(), r.run, 0});
-    for (const bool circulatory : {true, false}) {
-      const CorrectedLoad& load = circulatory ? result.circulatory : result.normal_force;
-      const VectorXd& truth = circulatory ? r.circulatory : r.normal_force;
-      const VectorXd off = load.value - truth, in_deviations = off.cwiseAbs().cwiseQuotient(load.std);
-      // 0.001 and 0.003 of the range measured; the rest is a margin for another draw of the noise.
-      EXPECT_LT(rms(off), (circulatory ? 0.0015 : 0.005) * (truth.maxCoeff() - truth.minCoeff()));
-      for (Index tenth = 0; tenth < 10; ++tenth)
-        EXPECT_GT(static_cast<double>((in_deviations.segment(tenth * samples / 10, samples / 10).array() < 1.96).count()), 0.85 * samples / 10) << tenth;
-      EXPECT_LT(in_deviations.maxCoeff(), load.simultaneous + 1) << "the whole curve: 95 % of such records stay below the first";
-      EXPECT_GT(in_deviations.mean(), 0.4) << "0.8 for errors as large as their band says: no band that is wide for nothing";
-    }
+    expect_found_within_its_band(result, r);
     EXPECT_NEAR(result.reduced_chi2, 1, 0.05);
     EXPECT_NEAR(result.slope, slope, 3 * result.slope_std);
     EXPECT_TRUE(result.warnings.empty()) << result.warnings.front();
@@ -210,16 +216,7 @@ TEST(Restless, ALongRecordIsFoundPieceByPiece) {
     constexpr Index samples = 90000;
     const Recorded r = record(motion, samples);
     const CorrectResult result = correct({test::null_rig(), test::null_fit(), r.run, 0});
-    for (const bool circulatory : {true, false}) {
-      const CorrectedLoad& load = circulatory ? result.circulatory : result.normal_force;
-      const VectorXd& truth = circulatory ? r.circulatory : r.normal_force;
-      const VectorXd off = load.value - truth, in_deviations = off.cwiseAbs().cwiseQuotient(load.std);
-      EXPECT_LT(rms(off), (circulatory ? 0.0015 : 0.005) * (truth.maxCoeff() - truth.minCoeff())) << "as in a shorter one";
-      for (Index tenth = 0; tenth < 10; ++tenth) EXPECT_GT((in_deviations.segment(tenth * samples / 10, samples / 10).array() < 1.96).cast<double>().mean(), 0.85) << tenth;
-      EXPECT_LT(in_deviations.maxCoeff(), load.simultaneous + 1);
-      EXPECT_GT(in_deviations.mean(), 0.4);
-      EXPECT_LT((load.by_source.rowwise().norm() - load.std).cwiseAbs().maxCoeff(), 1e-12);
-    }
+    expect_found_within_its_band(result, r);
     // Of 180 000 readings, 0.0033: three times that. 1.02 where fast readings of the chirp were taken for spikes.
     EXPECT_NEAR(result.reduced_chi2, 1, 0.01);
     EXPECT_NEAR(result.slope, slope, 3 * result.slope_std);

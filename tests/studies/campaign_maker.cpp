@@ -5,6 +5,7 @@
 #include <stdexcept>
 
 #include "core/simulate.h"
+#include "core/smooth_ramp.h"
 #include "fit/diagnose/trial_campaign.h"
 #include "tests/support/sample_data.h"
 
