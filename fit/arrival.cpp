@@ -276,7 +276,7 @@ bool widen_motion(RunResidual& run, const VectorXd& theta, std::vector<MotionBas
 
 double Arrival::reduced_chi2() const {
   double freedom = 0;
-  for (const RunResidual& run : joint.runs()) freedom += static_cast<double>(run.degrees_of_freedom());
+  for (const RunResidual& run : joint.runs()) freedom += run.is_aside() ? 0 : static_cast<double>(run.degrees_of_freedom());
   return joint.chi2() / freedom;
 }
 
@@ -328,10 +328,14 @@ Arrival extend(const FitProblem& problem, const Arrival& without, const std::sha
     for (Unknown& u : arrival.joint.unknowns())
       if (u.run == known.run && arrival.joint.parameter(u).name == name) u.value = known.value;
   }
+  const VectorXd anywhere = model->start_values();
   for (std::size_t r = 0; r < arrival.joint.runs().size(); ++r) {
-    arrival.joint.runs()[r].keep_noise_of(without.joint.runs()[r]);
-    arrival.joint.runs()[r].start_from(without.joint.runs()[r]);
-    arrival.joint.runs()[r].follow_in(without.joint.runs()[r].finer());
+    RunResidual& run = arrival.joint.runs()[r];
+    const RunResidual& known = without.joint.runs()[r];
+    run.keep_noise_of(known);
+    run.start_from(known);
+    run.follow_in(known.finer());
+    run.set_aside(known.is_aside() && run.takes_small_steps(anywhere));
   }
   for (RunResidual& run : arrival.joint.runs()) run.glance(true);
   choose_effect_starts(arrival, problem, added);
@@ -369,11 +373,13 @@ void look_elsewhere(Arrival& arrival) {
 
 void refine(Arrival& arrival, const FitProblem& problem) {
   JointProblem& joint = arrival.joint;
-  for (std::size_t r = 0; r < joint.runs().size(); ++r) joint.runs()[r].settle_noise(joint.theta(r));
+  for (std::size_t r = 0; r < joint.runs().size(); ++r)
+    if (!joint.runs()[r].is_aside()) joint.runs()[r].settle_noise(joint.theta(r));
   constexpr int rounds = 4;
   for (int round = 0; round < rounds; ++round) {
     std::vector<char> run_changed(joint.runs().size(), 0);
     in_parallel(run_changed.size(), [&](std::size_t r) {
+      if (joint.runs()[r].is_aside()) return;
       const VectorXd theta = joint.theta(r);
       const bool rejected = joint.runs()[r].reject_spikes(theta) > 0;
       run_changed[r] = widen_motion(joint.runs()[r], theta, arrival.windows[r]) || rejected;

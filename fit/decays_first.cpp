@@ -206,9 +206,16 @@ class Decays {
     return true;
   }
 
+  /// Of the decay of which most is left: chi-square over its samples.
+  double most_left() const { return most_left_; }
+
   /// chi-square over the degrees of freedom of the whole records; theta and c go back to the joint problem.
   double settle() {
     const LeastSquaresPoint point = try_values(problem_, problem_.values());
+    Index row = 0;
+    most_left_ = point.finite ? 0 : INFINITY;
+    for (std::size_t d = 0; d < decays_.size(); row += problem_.terms[d++].size)
+      most_left_ = std::max(most_left_, point.residual.segment(row, problem_.terms[d].size).squaredNorm() / static_cast<double>(runs_[d].observations()));
     for (std::size_t i = 0; i < free_.size(); ++i) joint_.unknowns()[free_[i]].value = problem_.unknowns[i].value;
     double freedom = -static_cast<double>(free_.size());
     for (std::size_t d = 0; d < decays_.size(); ++d) {
@@ -273,12 +280,13 @@ class Decays {
   std::vector<std::size_t> first_c_;
   LeastSquaresProblem problem_;
   Index samples_ = 0;
+  double most_left_ = INFINITY;
 };
 
 /// What one search leaves of the decays, and where it ended.
 struct Followed {
   JointProblem joint;
-  double left = INFINITY;
+  double left = INFINITY, most_left = INFINITY;
 };
 
 /// From theta and c of `start`, with a law whose corners bend a trajectory so often that only records that grow lead to it, if any do: the slower, the surer. Infinite
@@ -288,7 +296,9 @@ Followed follow_round_corners(const GrowingTrust& start) {
   std::vector<Followed> tried(2, {start.joint()});
   in_parallel(tried.size(), [&](std::size_t i) {
     Decays decays(tried[i].joint, start.linear());
-    if (decays.search(i == 0 ? 1.15 : 1.07, lost)) tried[i].left = decays.settle();
+    if (!decays.search(i == 0 ? 1.15 : 1.07, lost)) return;
+    tried[i].left = decays.settle();
+    tried[i].most_left = decays.most_left();
   });
   return std::move(tried[0].left < tried[1].left ? tried[0] : tried[1]);
 }
@@ -317,6 +327,16 @@ bool takes_small_steps(const JointProblem& joint) {
 }
 
 bool has_decays(const JointProblem& joint) { return std::any_of(joint.runs().begin(), joint.runs().end(), is_decay); }
+
+double left_as_trusted(const JointProblem& joint) {
+  JointProblem held = joint;
+  for (Unknown& u : held.unknowns()) u.held = true;
+  for (RunResidual& run : held.runs())
+    if (is_decay(run)) run.temper(1);
+  GrowingTrust trust(std::move(held));
+  trust.fit(GrowingTrust::trusted_levels);
+  return trust.left_as_trusted();
+}
 
 DecaysLeft fit_decays(JointProblem& joint, const std::string& id) {
   JointProblem start = joint;
@@ -350,12 +370,12 @@ DecaysLeft fit_decays(JointProblem& joint, const std::string& id) {
         if (Followed others = follow_round_corners(*other); others.left < found.left) found = std::move(others);
         if (other->better_than(*best)) best = std::move(other);
       }
-    constexpr double nearly_followed = 1.5;  // trajectories that cross the corners for seconds have least chi-squares everywhere; few are the deepest
-    if (found.left < nearly_followed) {
+    constexpr double to_the_noise = 1.05, nearly = 1.5;  // trajectories that cross the corners for seconds have least chi-squares everywhere; few are the deepest
+    if (!(found.most_left < to_the_noise)) best->fit(GrowingTrust::trusted_levels);
+    if (found.most_left < to_the_noise || (found.left < nearly && best->left_as_trusted() > followed)) {
       joint = std::move(found.joint);
       return {found.left, true};
     }
-    best->fit(GrowingTrust::trusted_levels);
     joint = best->joint();
     std::size_t d = 0;
     for (RunResidual& run : joint.runs())

@@ -26,4 +26,7 @@ struct DecaysLeft {
 /// when it is trusted to within some percents.
 DecaysLeft fit_decays(JointProblem& joint, const std::string& id);
 
+/// What laws that are trusted to within 2.5 % of the force that is missed leave of the decays: J over the samples, at the joint problem's theta.
+double left_as_trusted(const JointProblem& joint);
+
 }  // namespace unrig

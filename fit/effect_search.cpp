@@ -9,6 +9,7 @@
 #include "core/spectrum.h"
 #include "fit/decays_first.h"
 #include "fit/fit.h"
+#include "fit/own_parameters.h"
 #include "fit/standardised_residual.h"
 
 namespace unrig {
@@ -52,10 +53,14 @@ std::vector<LeftOfRun> left_of_runs(const JointProblem& joint) {
   std::vector<LeftOfRun> all(joint.runs().size());
   in_parallel(all.size(), [&](std::size_t r) {
     const RunResidual& run = joint.runs()[r];
+    const auto every_sample = static_cast<double>(run.run().samples());
+    if (run.is_aside()) {
+      all[r] = {1, every_sample, every_sample};
+      return;
+    }
     const RunResidual::Prediction p = run.predict(joint.theta(r));
     if (!p.output.allFinite()) {
-      const auto samples = static_cast<double>(run.run().samples());
-      all[r] = {run_away, samples, samples};
+      all[r] = {run_away, every_sample, every_sample};
       return;
     }
     double power = 0;
@@ -91,7 +96,7 @@ bool temper(JointProblem& joint) {
   bool changed = false;
   const std::vector<LeftOfRun> left = left_of_runs(joint);
   for (std::size_t r = 0; r < left.size(); ++r) {
-    if (!(left[r].variance < run_away)) continue;
+    if (joint.runs()[r].is_aside() || !(left[r].variance < run_away)) continue;
     const double factor = std::sqrt(std::max(1.0, left[r].variance)), now = factor < 1.1 ? 1.0 : factor;
     changed = changed || std::abs(std::log(now / joint.runs()[r].tempered())) > 0.1;
     joint.runs()[r].temper(now);
@@ -99,12 +104,21 @@ bool temper(JointProblem& joint) {
   return changed;
 }
 
+/// At the corners of a law slopes promise what steps do not keep: a search ends where they promise less than so much of chi-square.
+double precision_at_corners(const JointProblem& joint) {
+  constexpr double some = 0.02;
+  double freedom = 0;
+  for (const RunResidual& run : joint.runs()) freedom += run.is_aside() ? 0 : static_cast<double>(run.degrees_of_freedom());
+  return std::sqrt(some * freedom);
+}
+
 void anneal(Arrival& arrival, int rounds) {
+  const bool has_corners = takes_small_steps(arrival.joint);
   for (int round = 0; round < rounds; ++round) {
     JointProblem::SolveOptions options;
-    options.iterations = 8;
+    options.iterations = has_corners ? 3 : 8;
     options.tolerance = 1e-3;
-    options.precision = 0.5;  // candidates differ by more than half a standard error, or cannot be told apart
+    options.precision = has_corners ? precision_at_corners(arrival.joint) : 0.5;  // candidates differ by more than half a standard error, or cannot be told apart
     options.most_evaluations = 12;
     solve(arrival, options);
     if (!temper(arrival.joint)) return;
@@ -149,6 +163,10 @@ std::vector<std::vector<std::string>> in_order(const FitProblem& problem, const 
 }
 
 }  // namespace
+
+bool any_aside(const JointProblem& joint) {
+  return std::any_of(joint.runs().begin(), joint.runs().end(), [](const RunResidual& run) { return run.is_aside(); });
+}
 
 bool nonlinear(const Trial& trial) {
   const JointProblem& joint = trial.arrival.joint;
@@ -216,6 +234,7 @@ Trial prepare(const FitProblem& problem, const Trial& base, const std::vector<st
     if (std::find(base.effects.begin(), base.effects.end(), id) == base.effects.end()) added.push_back(id);
   const auto model = std::make_shared<const AeroelasticModel>(model_of(problem.rig, problem.runs, problem.circulation, effects));
   Trial trial{effects, extend(problem, base.arrival, model, added)};
+  if (any_aside(trial.arrival.joint)) trial.decays = base.decays;
   for (RunResidual& run : trial.arrival.joint.runs()) run.glance(true);
   trial.score = promised_share(trial.arrival.joint, base.arrival.joint.chi2());
   for (RunResidual& run : trial.arrival.joint.runs()) run.glance(false);
@@ -267,9 +286,36 @@ bool fit_decays_first(Trial& trial, const Trial& base) {
   return helps;
 }
 
+namespace {
+
+/// The runs whose motion is estimated, once the decays have told theta under a law with corners: each by itself, then all of them. Decays that are not followed exactly are set aside.
+void follow_motions(Trial& trial) {
+  JointProblem& joint = trial.arrival.joint;
+  const auto moves = [](const RunResidual& run) { return run.motion().unknowns() > 0; };
+  if (std::none_of(joint.runs().begin(), joint.runs().end(), moves)) return;
+  for (RunResidual& run : joint.runs()) run.set_aside(!trial.decays.exactly && !moves(run));
+  fit_own_parameters(joint);
+  temper(joint);
+  measure(trial);
+  Trial together = trial;
+  fit_fully(together, 2);
+  if (together.excess() < trial.excess()) trial = std::move(together);
+}
+
+}  // namespace
+
+void judge_decays(Trial& trial) {
+  if (!any_aside(trial.arrival.joint)) return;
+  trial.decays = {left_as_trusted(trial.arrival.joint), false};
+  measure(trial);
+}
+
 bool follow_nonlinear(Trial& trial, const Trial& base, double least) {
   if (!fit_decays_first(trial, base)) return false;
-  if (decays_decide(trial)) return true;
+  if (decays_decide(trial)) {
+    follow_motions(trial);
+    return true;
+  }
   fit_fully(trial, 2);
   if (trial.reduced_chi2() < least) fit_fully(trial, 6);
   return true;

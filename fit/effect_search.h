@@ -28,6 +28,9 @@ struct Trial {
 constexpr double explained = 1.15;  ///< residual power over noise power of a model that leaves nothing to name
 inline bool leaves_nothing(const Trial& trial) { return trial.reduced_chi2() < explained; }
 
+/// Whether any of the runs counts for nothing (RunResidual::set_aside).
+bool any_aside(const JointProblem& joint);
+
 /// Whether nonlinear effects are at work in any of the runs.
 bool nonlinear(const Trial& trial);
 /// Whether the last effect is such a law.
@@ -49,9 +52,11 @@ Trial prepare(const FitProblem& problem, const Trial& base, const std::vector<st
 /// Residual power over noise power of the runs whose motion is not estimated.
 double left_of_decays(const Trial& trial);
 
-/// Whether following the model takes several steps a sample (freeplay): what the free decays say of theta then stands, because the least chi-squares of the other
-/// runs in their motion, many and near each other, mislead a search.
+/// Whether following the model takes several steps a sample (freeplay): then free decays tell whether the law is worth following the other runs.
 bool decays_decide(const Trial& trial);
+
+/// Of decays that are set aside: what is left of them where their laws are trusted to within some per cent, all unknowns held (fit/decays_first.h).
+void judge_decays(Trial& trial);
 
 /// Of a prepared trial whose last effect is nonlinear: theta from the free decays alone (fit/decays_first.h), where there are any that
 /// `base` does not follow. False where the effect leaves more than half of the excess that `base` leaves of them: the other runs are not worth the search.

@@ -113,9 +113,10 @@ FitResult describe_fit(Arrival& arrival, const FitProblem& problem, Settle first
   result.chi2 = lin.chi2();
   for (const Unknown& u : joint.unknowns()) result.variables += u.held ? 0 : 1;
   for (std::size_t r = 0; r < joint.runs().size(); ++r) {
-    result.observations += joint.runs()[r].observations();
-    result.variables += joint.runs()[r].linear_unknowns();
-    result.runs.push_back(describe_run(joint.runs()[r], joint.theta(r), lin.run_chi2[r]));
+    const RunResidual& run = joint.runs()[r];
+    result.observations += run.is_aside() ? 0 : run.observations();
+    result.variables += run.is_aside() ? 0 : run.linear_unknowns();
+    result.runs.push_back(describe_run(run, joint.theta(r), run.is_aside() ? run.evaluate(joint.theta(r), Partials::none).chi2 : lin.run_chi2[r]));
   }
   describe_parameters(joint, uncertainty, problem.start, result);
   describe_profiles(joint, uncertainty, problem, result);

@@ -57,6 +57,7 @@ struct FittedRun {
   double chi2 = 0;
   Eigen::Index degrees_of_freedom = 0;
   std::vector<FittedChannel> channels;  ///< the fitted outputs, then `alpha` where the motion was estimated
+  bool aside = false;    ///< it crosses the corners of a law for so long that no search follows it: it had no part in the fit
   double whiteness = 1;  ///< probability that white noise looks at least as coloured as the residual
   double followed = 1;   ///< share of the readings' variance that the model follows (fit/share_followed.h), of the channel that it follows least
   double reduced_chi2() const { return chi2 / static_cast<double>(degrees_of_freedom); }

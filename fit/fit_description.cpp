@@ -108,6 +108,7 @@ FittedRun describe_run(const RunResidual& residual, const VectorXd& theta, doubl
   fitted.samples = run.samples();
   fitted.chi2 = chi2;
   fitted.degrees_of_freedom = residual.degrees_of_freedom();
+  fitted.aside = residual.is_aside();
   const auto add = [&](const std::string& name, const VectorXd& model, const VectorXd& weight, double noise) {
     const Channel& channel = run.channel(name);
     FittedChannel c;
@@ -213,7 +214,7 @@ void describe_profiles(const JointProblem& joint, const ParameterUncertainty& un
 void judge_answer(FitResult& result) {
   constexpr double half = 0.5;
   const auto known = [](const FittedParameter& p) { return p.identified; };
-  const auto lost = std::find_if(result.runs.begin(), result.runs.end(), [](const FittedRun& run) { return run.followed < half && !run.explained(); });
+  const auto lost = std::find_if(result.runs.begin(), result.runs.end(), [](const FittedRun& run) { return run.followed < half && !run.explained() && !run.aside; });
   std::string advice;
   if (result.no_answer = too_few_samples(result.observations, result.variables); !result.no_answer.empty()) {
     advice = "These runs are too short. ";
@@ -243,6 +244,11 @@ void judge_answer(FitResult& result) {
 
 void warn_of_mismatch(FitResult& result) {
   for (const FittedRun& run : result.runs) {
+    if (run.aside) {
+      result.warnings.push_back(fmt::format("{}: had no part in this fit: it crosses the corners of a law for so long that no search follows it to its end (reduced chi-square {:.2f}). The other runs determine the parameters.",
+                                            run.file, run.reduced_chi2()));
+      continue;
+    }
     if (run.explained()) continue;
     std::string which;
     for (const FittedChannel& c : run.channels)

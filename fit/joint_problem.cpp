@@ -43,6 +43,18 @@ std::string JointProblem::name(const Unknown& unknown) const {
   return unknown.run < 0 ? parameter_name : parameter_name + " (" + runs_[static_cast<std::size_t>(unknown.run)].run().file + ")";
 }
 
+JointProblem JointProblem::part(const std::vector<std::size_t>& runs) const {
+  std::vector<RunResidual> some;
+  for (const std::size_t r : runs) some.push_back(runs_[r]);
+  JointProblem part(*model_, std::move(some));
+  for (Unknown& u : part.unknowns_) {
+    const int run = u.run < 0 ? -1 : static_cast<int>(runs[static_cast<std::size_t>(u.run)]);
+    for (const Unknown& known : unknowns_)
+      if (known.parameter == u.parameter && known.run == run) u = {known.parameter, u.run, known.value, known.held, known.why_held};
+  }
+  return part;
+}
+
 VectorXd JointProblem::theta(std::size_t run) const {
   VectorXd theta = model_->start_values();
   for (const Unknown& u : unknowns_)
@@ -58,6 +70,7 @@ LeastSquaresProblem JointProblem::least_squares() const {
     problem.unknowns.push_back({name(u), u.value, p.lower, p.upper, u.held, 0});
   }
   for (std::size_t r = 0; r < runs_.size(); ++r) {
+    if (runs_[r].is_aside()) continue;
     ResidualTerm term;
     std::vector<Index> parameters;
     for (std::size_t i = 0; i < unknowns_.size(); ++i) {
@@ -110,6 +123,7 @@ JointProblem::Summary JointProblem::solve(const SolveOptions& options) {
   if (!options.prior) search.precision = std::min(search.precision, options.precision);
   search.effort = options.restarts ? LeastSquaresOptions::Effort::until_arrived : LeastSquaresOptions::Effort::once;
   search.evaluations = options.most_evaluations;
+  search.enough = options.enough * problem.degrees_of_freedom;
   const LeastSquaresResult result = solve_least_squares(problem, search);
   for (RunResidual& run : runs_) {
     if (some_held) run.differentiate_only({});
@@ -128,10 +142,11 @@ double JointProblem::Linearisation::chi2() const {
 JointProblem::Linearisation JointProblem::linearise() const {
   const auto count = static_cast<Index>(unknowns_.size()), rows = static_cast<Index>(model_->parameters().size()) + 1;
   Linearisation lin;
-  lin.residual.resize(rows * static_cast<Index>(runs_.size()));
+  lin.residual.setZero(rows * static_cast<Index>(runs_.size()));
   lin.jacobian = MatrixXd::Zero(lin.residual.size(), count);
   lin.run_chi2.resize(runs_.size());
   in_parallel(runs_.size(), [&](std::size_t r) {
+    if (runs_[r].is_aside()) return;
     const RunResidual::Evaluation e = runs_[r].evaluate(theta(r), Partials::all);
     const Index first = rows * static_cast<Index>(r);
     lin.residual.segment(first, rows) = e.residual;
@@ -146,7 +161,7 @@ JointProblem::Linearisation JointProblem::linearise() const {
 
 double JointProblem::chi2() const {
   std::vector<double> of_run(runs_.size());
-  in_parallel(runs_.size(), [&](std::size_t r) { of_run[r] = runs_[r].evaluate(theta(r), Partials::none).chi2; });
+  in_parallel(runs_.size(), [&](std::size_t r) { of_run[r] = runs_[r].is_aside() ? 0 : runs_[r].evaluate(theta(r), Partials::none).chi2; });
   return std::accumulate(of_run.begin(), of_run.end(), 0.0);
 }
 

@@ -21,7 +21,7 @@ struct Unknown {
 /// Holds unknown `index` weakly near its present value, while the data determine only some of them.
 ResidualTerm weak_prior(std::size_t index, const LeastSquaresUnknown& unknown);
 
-/// Several runs of one rig, and the unknowns they share.
+/// Several runs of one rig, and the unknowns they share. Runs that are set aside (RunResidual::set_aside) have no part in chi-square.
 class JointProblem {
  public:
   /// Unknowns at the model's start values: every shared parameter, and per run those that can act in it.
@@ -34,6 +34,9 @@ class JointProblem {
   const std::vector<Unknown>& unknowns() const { return unknowns_; }
   const Parameter& parameter(const Unknown& unknown) const { return model_->parameters()[static_cast<std::size_t>(unknown.parameter)]; }
 
+  /// The same with some of its runs, at the present values.
+  JointProblem part(const std::vector<std::size_t>& runs) const;
+
   /// The model's theta for one run.
   Eigen::VectorXd theta(std::size_t run) const;
 
@@ -44,6 +47,7 @@ class JointProblem {
     double precision = 0.01;  ///< and when it is shorter than this many standard errors
     bool restarts = false;    ///< where it does not arrive, try other ways (LeastSquaresOptions::Effort::until_arrived)
     int most_evaluations = 400;
+    double enough = 0;        ///< reduced chi-square with which the search ends wherever it stands
   };
   struct Summary {
     bool converged = false;

@@ -35,7 +35,7 @@ class Walk {
 
   void run(const LeastSquaresPoint& start, SearchStrategy strategy) {
     point = start;
-    SearchLimits limits{options_.iterations, options_.relative_change, options_.precision};
+    SearchLimits limits{options_.iterations, options_.relative_change, options_.precision, options_.enough};
     // A search that creeps along a curved valley takes its small steps for convergence: it goes on until it no longer gains.
     constexpr double finer = 1e-3;
     while (true) {
@@ -44,6 +44,11 @@ class Walk {
       evaluations += outcome.evaluations;
       point = outcome.point;
       if (!point.finite) return;
+      if (point.chi2() < options_.enough) {
+        standing = unrig::standing(problem_, point);
+        arrived = true;
+        return;
+      }
       evaluations += refine(problem_, options_.precision, point, standing);
       arrived = (standing.step_left <= std::max(arrival, options_.precision) || standing.within_rounding) && standing.next.rank >= rank_at_start_;
       limits.iterations -= std::max(1, outcome.iterations);

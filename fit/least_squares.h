@@ -72,6 +72,7 @@ struct LeastSquaresOptions {
     exhaustive      ///< all of them: the least of all minima found
   };
   Effort effort = Effort::until_arrived;
+  double enough = 0;  ///< chi2 with which an attempt ends, as arrived, wherever it stands: where slopes mislead near the least
 };
 
 struct LeastSquaresResult {

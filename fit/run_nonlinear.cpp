@@ -173,9 +173,10 @@ VectorXd RunResidual::as_the_angle_says() const {
 /// c searched along exact tangents over a part of the record that grows from where any start will do: of a motion, from just behind its beginning, where the angle has said nearly
 /// all and the law has turned the trajectory once at most. The least chi-squares of a motion are many: smaller strides lead to others.
 RunResidual::NonlinearPoint RunResidual::along_growing_record(const Linearised& lin, const VectorXd& theta, NonlinearPoint point) const {
-  constexpr double growth = 1.3, small = 1.1, followed = 1.5;
-  const bool moves = motion_.unknowns() > 0;
+  constexpr double growth = 1.3, small = 1.1, followed = 1.5, lost = 4;
+  const bool moves = motion_.unknowns() > 0, has_corners = moves && takes_small_steps(theta);
   constexpr Index hardly_moved = 20;
+  constexpr int on_the_way = 10;  // steps: each part begins near where the one before it ended
   const Index before = moves ? motion_.active().front().first : 0, first = before + (moves ? hardly_moved : 2 * unknowns_);
   if (moves) point.linear = as_the_angle_says();
   const auto in_strides = [&](double stride) {
@@ -185,9 +186,11 @@ RunResidual::NonlinearPoint RunResidual::along_growing_record(const Linearised& 
     part_lin.step = lin.step;
     NonlinearPoint at = point;
     for (part.last_sample_ = std::min(last_sample_, first); part.last_sample_ < last_sample_;) {
-      part.search_along_tangents(part_lin, theta, part.nonlinear_point(lin, theta, at.linear));
+      part.search_along_tangents(part_lin, theta, part.nonlinear_point(lin, theta, at.linear), has_corners ? on_the_way : part.most_steps());
       if (!std::isfinite(part_lin.chi2)) return at;
       at.linear = part_lin.linear;
+      const double noise = static_cast<double>((measured_.cols() + 1) * part.last_sample_) / (tempered_ * tempered_);
+      if (has_corners && part_lin.chi2 > lost * noise) break;  // nothing further on leads back
       part.last_sample_ = std::min(last_sample_, before + static_cast<Index>(stride * static_cast<double>(part.last_sample_ - before)) + 1);
     }
     return nonlinear_point(lin, theta, at.linear);
@@ -198,43 +201,61 @@ RunResidual::NonlinearPoint RunResidual::along_growing_record(const Linearised& 
   return other.chi2 < found.chi2 ? other : found;
 }
 
+/// In a search for c.
+int RunResidual::most_steps() const {
+  constexpr int a_glance = 2, nearby = 15, far_away = 30;  // a motion is searched again at the next theta
+  return glance_ ? a_glance : motion_.unknowns() > 0 && !from_afar_ ? nearby : far_away;
+}
+
 void RunResidual::solve_nonlinear(Linearised& lin, const VectorXd& theta) const {
   NonlinearPoint point = first_nonlinear_point(lin, theta);
   lin.chi2 = INFINITY;
   if (!std::isfinite(point.chi2)) return;
-  search_along_tangents(lin, theta, std::move(point));
+  const bool arrived = search_along_tangents(lin, theta, std::move(point), most_steps());
+  if (!arrived && !glance_ && !from_afar_ && motion_.unknowns() > 0 && takes_small_steps(theta)) search_from_the_beginning(lin, theta);
   if (std::isfinite(lin.chi2)) last_linear_ = lin.linear;
 }
 
-/// Levenberg-Marquardt steps in c: a full Gauss-Newton step where chi-square falls by it, else the more damped the longer it does not.
-void RunResidual::search_along_tangents(Linearised& lin, const VectorXd& theta, NonlinearPoint point) const {
-  constexpr int a_glance = 2, nearby = 15, far_away = 30;  // a motion is searched again at the next theta
-  const int most = glance_ ? a_glance : motion_.unknowns() > 0 && !from_afar_ ? nearby : far_away;
-  constexpr double least_damping = 1e-4, most_damping = 1e4, growth = 10;
+/// Between the corners of a law a search for c may come to rest far from any least chi-square. Where theta is wrong there is none: not again after a few times in vain.
+void RunResidual::search_from_the_beginning(Linearised& lin, const VectorXd& theta) const {
+  constexpr int enough = 3;
+  if (in_vain_ >= enough) return;
+  NonlinearPoint grown = along_growing_record(lin, theta, nonlinear_point(lin, theta, lin.linear));
+  const bool arrived = grown.chi2 < lin.chi2 && search_along_tangents(lin, theta, std::move(grown), most_steps());
+  in_vain_ = arrived ? 0 : in_vain_ + 1;
+}
+
+/// Levenberg-Marquardt steps in c: a full Gauss-Newton step where chi-square falls by it, else the more damped the longer it does not. False where it comes to rest although the
+/// slopes promise more than some per cent of chi-square, after `most` steps at the latest.
+bool RunResidual::search_along_tangents(Linearised& lin, const VectorXd& theta, NonlinearPoint point, int most) const {
+  constexpr double least_damping = 1e-4, most_damping = 1e4, growth = 10, much = 0.02;
   double damping = 0;
+  bool near = false;
   for (int i = 0; i < most; ++i) {
     if (!stack_nonlinear_rows(lin, theta, point.linear)) {
       lin.chi2 = INFINITY;
-      return;
+      return false;
     }
     const VectorXd step = lin.linear - point.linear;
     const double promised = point.chi2 - lin.chi2;
     lin.linear = point.linear;
     lin.chi2 = point.chi2;
-    if (!worth_going_on(promised, point.chi2)) return;
+    near = promised < much * point.chi2;
+    if (!worth_going_on(promised, point.chi2)) return true;
     const auto damped = [&] { return damping > 0 ? run_rows::damped_step(lin.eliminate->factor(), step, damping) : step; };
     NonlinearPoint next = nonlinear_point(lin, theta, point.linear + damped());
     while (!(next.chi2 < point.chi2) && damping < most_damping) {
       damping = std::max(least_damping, growth * damping);
       next = nonlinear_point(lin, theta, point.linear + damped());
     }
-    if (!(next.chi2 < point.chi2)) return;
+    if (!(next.chi2 < point.chi2)) return near;
     const double gained = point.chi2 - next.chi2;
     const bool creeps = gained < 0.01 * promised && gained < 1e-3 * point.chi2;
-    if (creeps) return;
+    if (creeps) return near;
     damping = damping > least_damping ? damping / growth : 0;
     point = std::move(next);
   }
+  return near;
 }
 
 void RunResidual::follow_nonlinear_partials(const LinearSystem& system, const VectorXd& theta, const VectorXd& linear, const TakeRows& take) const {
@@ -262,6 +283,7 @@ void RunResidual::follow_nonlinear_partials(const LinearSystem& system, const Ve
 bool RunResidual::find_linear(const VectorXd& theta, bool thoroughly) {
   if (model_->system(conditions_, theta, channels_).feedback.empty()) return false;
   from_afar_ = true;
+  in_vain_ = 0;
   thorough_ = thoroughly;
   solve(theta);
   from_afar_ = thorough_ = false;

@@ -159,6 +159,10 @@ class RunResidual {
   }
   double tempered() const { return tempered_; }
 
+  /// Counts for nothing in a joint fit, which neither follows it nor moves for it: a decay whose trajectory crosses the corners of a law for so long that no search follows it.
+  void set_aside(bool aside) { aside_ = aside; }
+  bool is_aside() const { return aside_; }
+
   /// A glance at a nonlinear run: c in two steps, and the model in one step a sample whatever its laws ask for. Enough to compare starts and candidates.
   void glance(bool only) { glance_ = only; }
 
@@ -204,7 +208,9 @@ class RunResidual {
   NonlinearPoint nonlinear_point(const Linearised& lin, const Eigen::VectorXd& theta, const Eigen::VectorXd& linear) const;
   Eigen::VectorXd without_laws(const Linearised& lin) const;
   void solve_nonlinear(Linearised& lin, const Eigen::VectorXd& theta) const;
-  void search_along_tangents(Linearised& lin, const Eigen::VectorXd& theta, NonlinearPoint point) const;
+  bool search_along_tangents(Linearised& lin, const Eigen::VectorXd& theta, NonlinearPoint point, int most) const;
+  int most_steps() const;
+  void search_from_the_beginning(Linearised& lin, const Eigen::VectorXd& theta) const;
   void add_prediction_slope(const Linearised& lin, const run_rows::Block& block, const Eigen::MatrixXd& linear_slope, Eigen::MatrixXd& slope) const;
   void prepare_linear(Linearised& lin) const;
   using TakeRows = std::function<void(std::size_t block, const Interval& samples, Eigen::MatrixXd rows)>;
@@ -237,7 +243,7 @@ class RunResidual {
   Eigen::MatrixXd weight_;    ///< 1 / sigma, 0 where left out
   std::vector<double> sigma_;
   double tempered_ = 1;
-  bool from_afar_ = false, thorough_ = false;
+  bool from_afar_ = false, thorough_ = false, aside_ = false;
   Eigen::VectorXd angle_, angle_weight_;
   double angle_sigma_ = 0;
   Eigen::MatrixXd motion_prior_;  ///< [c | 0]
@@ -254,6 +260,7 @@ class RunResidual {
 
   /// From where the search for c starts in a nonlinear run: c of the last solution, and that of the last one whose derivatives are known.
   mutable Eigen::VectorXd last_linear_;
+  mutable int in_vain_ = 0;  ///< searches from the beginning, one after the other
   struct Guide {
     Eigen::VectorXd theta, linear;
     Eigen::MatrixXd slope;  ///< d c / d theta

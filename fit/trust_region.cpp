@@ -134,18 +134,19 @@ class Cost : public ceres::CostFunction {
 /// Ends the search where the Gauss-Newton step left is short: the step that would only confirm it is saved.
 class EnoughIsEnough : public ceres::IterationCallback {
  public:
-  EnoughIsEnough(const LeastSquaresProblem& problem, const Cost& cost, double precision) : problem_(problem), cost_(cost), precision_(precision) {}
+  EnoughIsEnough(const LeastSquaresProblem& problem, const Cost& cost, const SearchLimits& limits) : problem_(problem), cost_(cost), limits_(limits) {}
   ceres::CallbackReturnType operator()(const ceres::IterationSummary& iteration) override {
     if (iteration.iteration > 0 && !iteration.step_is_successful) return ceres::SOLVER_CONTINUE;
     const LeastSquaresPoint& point = cost_.present();
+    if (point.chi2() < limits_.enough) return ceres::SOLVER_TERMINATE_SUCCESSFULLY;
     const double promised = gauss_newton(problem_, point).promised;
-    return promised <= precision_ * precision_ * variance_factor(problem_, point.chi2()) ? ceres::SOLVER_TERMINATE_SUCCESSFULLY : ceres::SOLVER_CONTINUE;
+    return promised <= limits_.precision * limits_.precision * variance_factor(problem_, point.chi2()) ? ceres::SOLVER_TERMINATE_SUCCESSFULLY : ceres::SOLVER_CONTINUE;
   }
 
  private:
   const LeastSquaresProblem& problem_;
   const Cost& cost_;
-  double precision_;
+  const SearchLimits& limits_;
 };
 
 }  // namespace
@@ -188,7 +189,7 @@ SearchOutcome search(const LeastSquaresProblem& problem, const LeastSquaresPoint
     run(homotopy_iterations, homotopy_change);
   }
   cost.shift({});
-  EnoughIsEnough enough(problem, cost, limits.precision);
+  EnoughIsEnough enough(problem, cost, limits);
   options.callbacks.push_back(&enough);
   run(limits.iterations, limits.relative_change);
   outcome.point = cost.at(u);

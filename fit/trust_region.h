@@ -23,6 +23,7 @@ struct SearchLimits {
   int iterations = 0;
   double relative_change = 0;  ///< of chi2 in one step
   double precision = 0;        ///< Gauss-Newton step left, in standard errors
+  double enough = 0;           ///< chi2
 };
 
 struct SearchOutcome {

@@ -51,6 +51,10 @@ ParameterUncertainty estimate_uncertainty(const JointProblem& joint) {
   u.white_covariance = by_theta * inverse * by_theta.transpose();
   for (Index r = 0; r < runs; ++r) {
     const RunResidual& run = joint.runs()[static_cast<std::size_t>(r)];
+    if (run.is_aside()) {
+      u.whiteness.push_back(1);
+      continue;
+    }
     const VectorXd theta = joint.theta(static_cast<std::size_t>(r));
     const RunResidual::Sensitivity sensitivity = run.sensitivity(theta);
     std::vector<VectorXd> residuals;

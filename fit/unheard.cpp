@@ -101,7 +101,7 @@ std::string elsewhere(JointProblem& joint, const Resonance& r, const StartValues
 
 bool hold_unheard(JointProblem& joint, const ParameterUncertainty& uncertainty, const StartValues& starts) {
   double freedom = 0;
-  for (const RunResidual& run : joint.runs()) freedom += static_cast<double>(run.degrees_of_freedom());
+  for (const RunResidual& run : joint.runs()) freedom += run.is_aside() ? 0 : static_cast<double>(run.degrees_of_freedom());
   const double variance = std::max(1.0, joint.chi2() / freedom);
   bool held = false;
   for (const std::string modes : {"normal", "torsion"}) {

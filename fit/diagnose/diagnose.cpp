@@ -43,11 +43,14 @@ std::vector<ImprovedRun> predict_unseen(const DiagnoseProblem& problem, const Fi
   FitProblem after = fit_problem;
   after.effects = best.effects;
   const bool leave_out = problem.heldout.empty() && problem.runs.size() > 1 && !best.effects.empty();
-  std::vector<ImprovedRun> unseen(leave_out ? problem.runs.size() : problem.heldout.size());
+  std::vector<std::size_t> predicted;  // not what no search follows
+  for (std::size_t i = 0; i < (leave_out ? problem.runs.size() : problem.heldout.size()); ++i)
+    if (!leave_out || !best.arrival.joint.runs()[i].is_aside()) predicted.push_back(i);
+  std::vector<ImprovedRun> unseen(predicted.size());
   in_parallel(unseen.size(), [&](std::size_t i) {
-    const Run& run = leave_out ? problem.runs[i] : problem.heldout[i];
-    const HeldoutResidual b = leave_out ? predict_left_out(baseline, fit_problem, i) : predict_heldout(baseline, fit_problem, run);
-    const HeldoutResidual a = leave_out ? predict_left_out(best.arrival, after, i) : predict_heldout(best.arrival, after, run);
+    const Run& run = leave_out ? problem.runs[predicted[i]] : problem.heldout[predicted[i]];
+    const HeldoutResidual b = leave_out ? predict_left_out(baseline, fit_problem, predicted[i]) : predict_heldout(baseline, fit_problem, run);
+    const HeldoutResidual a = leave_out ? predict_left_out(best.arrival, after, predicted[i]) : predict_heldout(best.arrival, after, run);
     unseen[i] = {run.file, b.channel, run.channel(b.channel).unit, true, leave_out, b.rms, a.rms, a.noise};
   });
   return unseen;
@@ -143,7 +146,7 @@ Diagnosis diagnose(const DiagnoseProblem& problem) {
   Selection selection(problem, fit_problem, baseline);
   const Trial best = selection.best_set();
   d.ranking = selection.ranking();
-  d.remaining = locate_mismatch(best.arrival.joint);
+  d.remaining = what_remains(best);
   const bool clean = !d.remaining.found;
   const std::vector<ImprovedRun> unseen = problem.verdict_only ? std::vector<ImprovedRun>{} : predict_unseen(problem, fit_problem, baseline.arrival, best);
   const bool predicts = best.effects.empty() || power_over_noise(unseen, &ImprovedRun::rms_after) <= power_over_noise(unseen, &ImprovedRun::rms_before);

@@ -61,14 +61,11 @@ HeldoutResidual predict_heldout(const Arrival& arrival, const FitProblem& proble
 
 HeldoutResidual predict_left_out(const Arrival& arrival, const FitProblem& problem, std::size_t run) {
   const JointProblem& all = arrival.joint;
-  std::vector<RunResidual> others;
+  std::vector<std::size_t> others;
   for (std::size_t r = 0; r < all.runs().size(); ++r)
-    if (r != run) others.push_back(all.runs()[r]);
-  Arrival without{arrival.model, {}, JointProblem(*arrival.model, std::move(others))};
-  const auto left_out = static_cast<int>(run);
-  for (Unknown& u : without.joint.unknowns())
-    for (const Unknown& known : all.unknowns())
-      if (known.parameter == u.parameter && known.run == (u.run >= left_out ? u.run + 1 : u.run)) u.value = known.value;
+    if (r != run) others.push_back(r);
+  Arrival without{arrival.model, {}, all.part(others)};
+  for (Unknown& u : without.joint.unknowns()) u.held = false;
   hold_undetermined(without.joint);  // the run may have been the only one that tells
   JointProblem::SolveOptions options;
   options.iterations = 12;

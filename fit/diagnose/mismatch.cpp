@@ -93,6 +93,7 @@ Mismatch locate_mismatch(const JointProblem& joint) {
   std::vector<std::size_t> owner;
   for (std::size_t r = 0; r < joint.runs().size(); ++r) {
     const RunResidual& run = joint.runs()[r];
+    if (run.is_aside()) continue;
     const RunResidual::Prediction p = run.predict(joint.theta(r));
     for (std::size_t c = 0; c < p.channels.size(); ++c) {
       VectorXd left = standardised_residual(run, p, c);

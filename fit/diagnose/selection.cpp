@@ -57,8 +57,13 @@ bool plausible(const Trial& trial) {
   });
 }
 
-/// What `trial` leaves above the noise of the runs by which `judged` is judged: its decays alone where these decide, since of the other runs more may be left while they are not followed.
-double excess_that_tells(const Trial& judged, const Trial& trial) { return decays_decide(judged) ? left_of_decays(trial) - 1 : trial.excess(); }
+/// Whether what `trial` adds to `base` takes next to nothing of what that leaves: of the decays alone where it adds a law by which these decide, since of the other runs more may be left while they are not
+/// followed.
+bool takes_nothing(const Trial& trial, const Trial& base) {
+  const bool by_decays = decays_decide(trial) && !decays_decide(base);
+  const auto excess = [&](const Trial& t) { return by_decays ? left_of_decays(t) - 1 : t.excess(); };
+  return excess(trial) > hardly_less * excess(base);
+}
 
 bool any_leaves_nothing(const Trials& trials) { return std::any_of(trials.begin(), trials.end(), leaves_nothing); }
 
@@ -90,6 +95,15 @@ Trial in_finer_steps(Trial trial) {
 }
 
 }  // namespace
+
+Mismatch what_remains(const Trial& trial) {
+  Mismatch mismatch = locate_mismatch(trial.arrival.joint);
+  if (!any_aside(trial.arrival.joint) || trial.decays.chi2 < explained) return mismatch;
+  mismatch.found = true;
+  if (mismatch.runs.empty()) mismatch.summary.clear();
+  mismatch.summary += fmt::format("{}the free decays, followed with their laws trusted to some per cent, are left with {:.2g} times the power of their noise", mismatch.runs.empty() ? "" : "; ", trial.decays.chi2);
+  return mismatch;
+}
 
 Selection::Selection(const DiagnoseProblem& problem, const FitProblem& fit_problem, const Trial& baseline) : problem_(problem), fit_problem_(fit_problem), baseline_(baseline) {
   ranking_.push_back({{}, baseline.reduced_chi2(), 0, 0, 0});
@@ -176,7 +190,7 @@ Trial Selection::without_superfluous(Trial trial) const {
 /// Of several effects that leave a mismatch a signal is exchanged for what explains more beside the others: found first, it may have stood in for what was still missing.
 Trial Selection::exchanged(Trial trial, const Strings& hopeless) {
   for (std::size_t k = 0; k + 1 < trial.effects.size(); ++k) {
-    if (!is_a_signal(trial.effects[k], trial.arrival.joint) || !locate_mismatch(trial.arrival.joint).found) continue;
+    if (!is_a_signal(trial.effects[k], trial.arrival.joint) || !what_remains(trial).found) continue;
     Strings fewer = trial.effects, not_again = hopeless;
     not_again.push_back(fewer[k]);
     fewer.erase(fewer.begin() + static_cast<std::ptrdiff_t>(k));
@@ -219,24 +233,25 @@ Trial Selection::best_set() {
   std::optional<Trial> sufficient;  // a law that is followed all but exactly: what it leaves has a name only where that leaves nothing
   Strings hopeless;  // laws with which alone the fit is worse than without: from that far away they are not found, and are not tried again before half of the way is gone
   constexpr double half_way = 0.5;
-  while (best.effects.size() < most_effects && !decays_decide(best) && locate_mismatch(best.arrival.joint).found) {
+  while (best.effects.size() < most_effects && what_remains(best).found) {
     best = in_finer_steps(std::move(best));
-    if (!locate_mismatch(best.arrival.joint).found) break;
+    if (!what_remains(best).found) break;
     if (!sufficient && nonlinear(best) && best.excess() < (1 - enough_to_name) * baseline_.excess() && leaves_nothing(best)) sufficient = best;
     tell(best.effects.empty() ? "trying what may be missing" : "trying what may be missing beside " + best.effects.back());
     Trials tried = try_one_more(best, hopeless);
     for (const Trial& t : tried)
       if (best.effects.empty() && brings_a_law(t) && bic_difference(t, baseline_) > decisive) hopeless.push_back(t.effects.back());
     if (best.effects.empty()) try_with_all_modes(tried);
-    std::erase_if(tried, [&](const Trial& t) { return !leaves_nothing(t) && excess_that_tells(t, t) > hardly_less * excess_that_tells(t, best); });
+    std::erase_if(tried, [&](const Trial& t) { return !leaves_nothing(t) && takes_nothing(t, best); });
     if (tried.empty()) break;
     const Trial next = without_stand_in(tried);
     if (!(best.effects.empty() || plausible(next)) || bic_difference(next, best) > -decisive) break;
     if (next.excess() < half_way * best.excess()) hopeless.clear();
     best = exchanged(without_superfluous(next), hopeless);
+    judge_decays(best);
     std::move(tried.begin(), tried.end(), std::back_inserter(tried_));
   }
-  return sufficient && locate_mismatch(best.arrival.joint).found ? *sufficient : best;
+  return sufficient && what_remains(best).found ? *sufficient : best;
 }
 
 /// Probabilities: exp(-BIC/2) over the sum of it over all.

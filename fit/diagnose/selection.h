@@ -9,6 +9,9 @@ namespace unrig {
 
 constexpr double decisive = 10;  ///< BIC: very strong evidence (Kass and Raftery, J. American Statistical Association 90 (1995) 773)
 
+/// What a fit leaves (locate_mismatch); of decays that are set aside, what laws leave of them that are trusted to within some per cent.
+Mismatch what_remains(const Trial& trial);
+
 /// Which set of effects explains what a baseline leaves. The set grows by one effect at a time, the best of all that are worth a fit; what others made superfluous
 /// is taken away again, and while a mismatch remains signals among the earlier members are exchanged for what explains more beside the others. No set has more than three.
 class Selection {
