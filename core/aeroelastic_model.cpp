@@ -320,7 +320,7 @@ LinearSystem AeroelasticModel::beam_system(const Conditions& conditions, const V
   force.dual = force.dual + quarter_chord.transpose() * circulatory.dual;
   force.add_prescribed_acceleration(-inertia.topRows(n));
   force.dual.add_partial(apparent_mass, -force.prescribed_acceleration(wet.topRows(n)));
-  if (layout.force >= 0) force.dual.value.col(layout.states + layout.force) += normal_n.row(rig_.calibration_element - 1).transpose();
+  if (layout.force >= 0) force.dual.value.col(layout.states + layout.force) += normal_n.row(rig_.loaded_element() - 1).transpose();
   if (layout.strip_port >= 0) force.dual.value.middleCols(layout.states + layout.strip_port, strip_count) += strips.normal.leftCols(n).transpose();
   if (layout.coordinate_port >= 0) force.dual.value.middleCols(layout.states + layout.coordinate_port, n) += MatrixXd::Identity(n, n);
   const DualMatrix acceleration = solve(mass, force.dual);

@@ -52,6 +52,7 @@ struct Rig {
   double strip_length = 0;      ///< m
   int gauge_element = 0;        ///< from 1; 0: the rig has no gauge
   int calibration_element = 0;  ///< from 1
+  int loaded_element() const { return calibration_element > 0 ? calibration_element : 1; }  ///< where a single force acts: of a rig without a gauge the first
   double calibration_uncertainty = 0;        ///< of the gauge, relative, one standard deviation
   std::vector<GaugeFilter> gauge_filters;    ///< between bridge and record, where they are known
 

@@ -64,7 +64,7 @@ void append_feedback(LinearSystem& system, const DualMatrix& direction, Feedback
 
 Eigen::RowVectorXd first_mode(const AeroelasticModel& model, Index coordinates) {
   const Rig& rig = model.rig();
-  const double shape = rig.is_modal() ? 1 : model.basis().normal((rig.calibration_element > 0 ? rig.calibration_element : 1) - 1, 0);
+  const double shape = rig.is_modal() ? 1 : model.basis().normal(rig.loaded_element() - 1, 0);
   return shape * Eigen::RowVectorXd::Unit(coordinates, 0);
 }
 

@@ -412,6 +412,21 @@ unrig::Run run_with(const std::vector<std::string>& columns) {
   return run;
 }
 
+/// There was a row before the first once.
+TEST(AeroelasticModel, AForceOnARigWithoutAGaugeActsAtItsFirstElement) {
+  Rig rig = seed_rig(), loaded = rig;
+  rig.gauge_element = rig.calibration_element = loaded.gauge_element = 0;
+  loaded.calibration_element = 1;
+  Conditions c = still();
+  c.force = true;
+  const auto pushed = [&](const Rig& r) {
+    const AeroelasticModel model(r, make_basis(r, Index{3}, Index{1}), wagner(Wagner::jones));
+    return MatrixXd(model.system(c, model.start_values(), {"heave"}).B.value);
+  };
+  EXPECT_EQ(pushed(rig), pushed(loaded));
+  EXPECT_GT(pushed(rig).norm(), 0);
+}
+
 TEST(AeroelasticModel, FitsTheGaugeAndEverySensorThatTheRunHas) {
   const AeroelasticModel model = seed_model();
   EXPECT_EQ(model.output_channels(run_with({"alpha", "gauge", "twist", "note"})), (std::vector<std::string>{"gauge", "twist"}));

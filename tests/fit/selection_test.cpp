@@ -126,5 +126,12 @@ TEST(Selection, SharpFrictionIsFollowedInFinerSteps) {
   EXPECT_FALSE(d.unexplained) << d.remaining.summary;
 }
 
+/// The decays cross the corners for seconds, and are explained by a law that is trusted to within some per cent; the steps are followed to the noise from what the decays tell.
+TEST(Selection, StepsOfARigWithAGapAreFollowedToTheNoise) {
+  const Diagnosis d = verdict_on(pair(3902, 5, {"freeplay"}, true), {"freeplay", "coulomb-friction", "wagner-lag"});
+  EXPECT_THAT(found_in(d), UnorderedElementsAre("freeplay"));
+  EXPECT_FALSE(d.unexplained) << d.remaining.summary;
+}
+
 }  // namespace
 }  // namespace unrig
