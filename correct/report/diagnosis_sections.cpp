@@ -121,7 +121,8 @@ void add_improvement(ReportPage& page, const json& improvement) {
   for (const json& r : member(improvement, "runs", json::array())) {
     const double before = number_of(r, "rms_before"), after = number_of(r, "rms_after"), noise = number_of(r, "noise");
     const std::string channel = text_of(r, "channel");
-    rows.push_back({file_name(text_of(r, "file")) + (channel.empty() || channel == "gauge" ? "" : ", " + channel), member(r, "heldout", false).get<bool>() ? "held out" : "fitted", plain(before, 4), plain(after, 4), plain(noise, 4), text_of(r, "unit"),
+    const std::string kind = member(r, "heldout", false).get<bool>() ? "held out" : member(r, "set_aside", false).get<bool>() ? "set aside" : "fitted";
+    rows.push_back({file_name(text_of(r, "file")) + (channel.empty() || channel == "gauge" ? "" : ", " + channel), kind, plain(before, 4), plain(after, 4), plain(noise, 4), text_of(r, "unit"),
                     plain(before / noise, 3), plain(after / noise, 3)});
   }
   if (rows.empty()) return;

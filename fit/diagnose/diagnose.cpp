@@ -74,7 +74,7 @@ void describe(const DiagnoseProblem& problem, const FitProblem& fit_problem, con
     for (std::size_t c = 0; c < d.before.runs[r].channels.size(); ++c) {
       const FittedChannel &b = d.before.runs[r].channels[c], &a = d.after.runs[r].channels[c];
       if (b.name == "alpha") continue;
-      d.runs.push_back({problem.runs[r].file, b.name, b.unit, false, false, b.rms_residual, a.rms_residual, std::min(a.noise, b.noise)});
+      d.runs.push_back({problem.runs[r].file, b.name, b.unit, false, false, b.rms_residual, a.rms_residual, std::min(a.noise, b.noise), d.after.runs[r].aside});
     }
   }
 }

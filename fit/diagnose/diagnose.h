@@ -53,6 +53,7 @@ struct ImprovedRun {
   bool heldout = false;   ///< not fitted but predicted
   bool left_out = false;  ///< predicted from the other runs, where no run was held out; it has an entry as a fitted run too
   double rms_before = 0, rms_after = 0, noise = 0;
+  bool aside = false;  ///< had no part in the fit after (FittedRun::aside): the laws that it is judged by are trusted to within some per cent only
 };
 
 struct Diagnosis {

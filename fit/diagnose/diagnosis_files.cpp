@@ -1,5 +1,6 @@
 #include "fit/diagnose/diagnosis_files.h"
 
+#include <algorithm>
 #include <cmath>
 
 #include <fmt/format.h>
@@ -98,12 +99,19 @@ std::string effects_text(const std::vector<MissingEffect>& effects) {
   return text;
 }
 
+/// What part a run had.
+const char* kind_of(const ImprovedRun& run) {
+  if (run.left_out) return "left out";
+  if (run.heldout) return "held out";
+  return run.aside ? "set aside" : "fitted";
+}
+
 }  // namespace
 
 std::string to_json(const Diagnosis& d) {
   ordered_json runs = ordered_json::array(), ranking = ordered_json::array();
   for (const ImprovedRun& r : d.runs) {
-    runs.push_back({{"file", r.file}, {"channel", r.channel}, {"heldout", r.heldout}, {"left_out", r.left_out}, {"rms_before", number(r.rms_before)}, {"rms_after", number(r.rms_after)}, {"noise", number(r.noise)}, {"unit", r.unit}});
+    runs.push_back({{"file", r.file}, {"channel", r.channel}, {"heldout", r.heldout}, {"left_out", r.left_out}, {"set_aside", r.aside}, {"rms_before", number(r.rms_before)}, {"rms_after", number(r.rms_after)}, {"noise", number(r.noise)}, {"unit", r.unit}});
     for (const ResidualMaps& m : d.maps)
       if (m.run == r.file && m.channel == r.channel && !r.heldout && !r.left_out) runs.back()["map"] = map_json(m);
   }
@@ -152,7 +160,9 @@ std::string report(const Diagnosis& d) {
                         base_name(f.run), std::sqrt(f.value.squaredNorm() / static_cast<double>(f.value.size())), f.standard_deviation);
   text += "[[Improvement]]\n";
   for (const ImprovedRun& r : d.runs)
-    text += fmt::format("    {:<20} {:<8} {:9.4g} -> {:9.4g} {} (noise {:.4g})\n", base_name(r.file) + (r.channel == "gauge" ? "" : ": " + r.channel), r.left_out ? "left out" : r.heldout ? "held out" : "fitted", r.rms_before, r.rms_after, r.unit, r.noise);
+    text += fmt::format("    {:<20} {:<8} {:9.4g} -> {:9.4g} {} (noise {:.4g})\n", base_name(r.file) + (r.channel == "gauge" ? "" : ": " + r.channel), kind_of(r), r.rms_before, r.rms_after, r.unit, r.noise);
+  if (std::any_of(d.runs.begin(), d.runs.end(), [](const ImprovedRun& r) { return r.aside; }))
+    text += "    set aside: it crosses the corners of a law for so long that no search follows it to its end; it is judged by what laws leave of it that are trusted to within some per cent, and had no part in the fit\n";
   if (d.ranking.size() > 1) {
     text += "[[Tried]] reduced chi-square, BIC against nothing missing\n";
     for (const Candidate& c : d.ranking) text += fmt::format("    {:<36} {:10.4g} {:12.5g}\n", set_name(c.effects), c.reduced_chi2, c.delta_bic);
