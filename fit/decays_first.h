@@ -22,8 +22,8 @@ struct DecaysLeft {
 /// laws that are trusted more and more (fit/law_smoother.h), from the present size of the effect (its first parameter) and from the first values of parameters that
 /// have gone astray; from there theta and the linear unknowns c are searched side by side with the model itself. Where that does not follow the decays, once more from
 /// a smaller and a larger size. A large trajectory that crosses the corners of a law for seconds tells errors of theta from each other as little as chance does, and has least chi-squares
-/// everywhere: of the ways to a law that takes small steps the one that leaves least is kept, and where none leaves less than half as much again as the noise, the law is asked what it leaves
-/// when it is trusted to within some percents.
+/// everywhere: of the ways to a law that takes small steps the one that leaves least is kept, and where it leaves one of the decays above its noise, the law is asked what it leaves
+/// when it is trusted to within some per cent; that holds where it is the noise, or where the model itself leaves more than half as much again.
 DecaysLeft fit_decays(JointProblem& joint, const std::string& id);
 
 /// What laws that are trusted to within 2.5 % of the force that is missed leave of the decays: J over the samples, at the joint problem's theta.

@@ -120,7 +120,7 @@ std::string to_json(const FitResult& r) {
     const FittedChannel& first = run.channels.front();
     out["runs"].push_back({{"file", run.file}, {"fingerprint", run.fingerprint}, {"onset_angle", number(run.onset_angle)}, {"samples", run.samples}, {"rms_residual", number(first.rms_residual)}, {"noise", number(first.noise)},
                            {"unit", first.unit}, {"reduced_chi2", number(run.reduced_chi2())}, {"whiteness", number(run.whiteness)}, {"explained", run.explained()},
-                           {"followed", number(run.followed)}, {"channels", channels}});
+                           {"followed", number(run.followed)}, {"set_aside", run.aside}, {"channels", channels}});
   }
   out["warnings"] = r.warnings;
   return out.dump(2) + "\n";
@@ -285,7 +285,7 @@ std::string report(const FitResult& r, double least) {
 
   text += "[[Runs]]\n";
   for (const FittedRun& run : r.runs) {
-    text += fmt::format("    {}: {} samples, reduced chi-square {:.3f}\n", base_name(run.file), run.samples, run.reduced_chi2());
+    text += fmt::format("    {}: {} samples, reduced chi-square {:.3f}{}\n", base_name(run.file), run.samples, run.reduced_chi2(), run.aside ? ", set aside: no part in the fit" : "");
     for (const FittedChannel& c : run.channels)
       text += fmt::format("        {:<6} residual {:.4g} {}, noise {:.4g} {}{}{}\n", c.name, c.rms_residual, c.unit, c.noise, c.unit,
                           c.missing ? fmt::format(", {} missing", c.missing) : "", c.spikes ? fmt::format(", {} spikes left out", c.spikes) : "");

@@ -8,9 +8,9 @@
 namespace unrig {
 namespace {
 
-constexpr double explained = 1.02;  ///< reduced chi-square
+constexpr double to_the_noise = 1.02;  // reduced chi-square: one per cent of it is chance in a few thousand samples
 
-/// Of one run; joint problems of the others may be searched meanwhile.
+/// One run of a joint problem, its own parameters searched.
 JointProblem fitted_alone(const JointProblem& joint, std::size_t r) {
   JointProblem alone = joint.part({r});
   for (Unknown& u : alone.unknowns()) u.held = u.held || u.run < 0;
@@ -20,8 +20,8 @@ JointProblem fitted_alone(const JointProblem& joint, std::size_t r) {
   options.tolerance = 1e-2;
   options.precision = 0.5;
   options.most_evaluations = 12;
-  options.enough = explained;
-  const double enough = explained * static_cast<double>(alone.runs().front().degrees_of_freedom());
+  options.enough = to_the_noise;
+  const double enough = to_the_noise * static_cast<double>(alone.runs().front().degrees_of_freedom());
   constexpr int rounds = 2;
   for (int round = 0; round < rounds; ++round) {
     alone.solve(options);

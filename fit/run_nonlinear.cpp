@@ -220,7 +220,7 @@ void RunResidual::solve_nonlinear(Linearised& lin, const VectorXd& theta) const 
 void RunResidual::search_from_the_beginning(Linearised& lin, const VectorXd& theta) const {
   constexpr int enough = 3;
   if (in_vain_ >= enough) return;
-  NonlinearPoint grown = along_growing_record(lin, theta, nonlinear_point(lin, theta, lin.linear));
+  NonlinearPoint grown = along_growing_record(lin, theta, {});
   const bool arrived = grown.chi2 < lin.chi2 && search_along_tangents(lin, theta, std::move(grown), most_steps());
   in_vain_ = arrived ? 0 : in_vain_ + 1;
 }

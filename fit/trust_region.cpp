@@ -131,7 +131,7 @@ class Cost : public ceres::CostFunction {
   mutable int evaluations_ = 0;
 };
 
-/// Ends the search where the Gauss-Newton step left is short: the step that would only confirm it is saved.
+/// Ends the search where chi-square is low enough, or the Gauss-Newton step left is short: the step that would only confirm it is saved.
 class EnoughIsEnough : public ceres::IterationCallback {
  public:
   EnoughIsEnough(const LeastSquaresProblem& problem, const Cost& cost, const SearchLimits& limits) : problem_(problem), cost_(cost), limits_(limits) {}

@@ -43,9 +43,12 @@ std::vector<ImprovedRun> predict_unseen(const DiagnoseProblem& problem, const Fi
   FitProblem after = fit_problem;
   after.effects = best.effects;
   const bool leave_out = problem.heldout.empty() && problem.runs.size() > 1 && !best.effects.empty();
-  std::vector<std::size_t> predicted;  // not what no search follows
+  const std::vector<RunResidual>& fitted = best.arrival.joint.runs();
+  const auto has_part = [](const RunResidual& run) { return !run.is_aside(); };
+  const bool others_tell = std::count_if(fitted.begin(), fitted.end(), has_part) > 1;
+  std::vector<std::size_t> predicted;  // not what no search follows, nor what nothing but itself has told of
   for (std::size_t i = 0; i < (leave_out ? problem.runs.size() : problem.heldout.size()); ++i)
-    if (!leave_out || !best.arrival.joint.runs()[i].is_aside()) predicted.push_back(i);
+    if (!leave_out || (has_part(fitted[i]) && others_tell)) predicted.push_back(i);
   std::vector<ImprovedRun> unseen(predicted.size());
   in_parallel(unseen.size(), [&](std::size_t i) {
     const Run& run = leave_out ? problem.runs[predicted[i]] : problem.heldout[predicted[i]];

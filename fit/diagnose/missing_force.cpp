@@ -148,6 +148,7 @@ std::vector<MissingForce> missing_forces(const JointProblem& joint) {
   in_parallel(forces.size(), [&](std::size_t r) {
     const RunResidual& run = joint.runs()[r];
     const Rig& rig = joint.model().rig();
+    if (run.is_aside()) return;  // what the model leaves of it is no force but a trajectory that was not found
     if (run.channels().front() != "gauge" || (!rig.is_modal() && rig.calibration_element == 0)) return;
     const VectorXd theta = joint.theta(r);
     Conditions conditions = run.conditions();

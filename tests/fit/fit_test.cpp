@@ -15,6 +15,7 @@
 #include "core/error.h"
 #include "core/simulate.h"
 #include "core/text_file.h"
+#include "fit/effect_search.h"
 #include "fit/fit_files.h"
 #include "tests/support/sample_data.h"
 #include "tests/support/shared_data.h"
@@ -55,6 +56,18 @@ Channel& channel(unrig::Run& run, const std::string& name) {
 }
 
 // ---------------------------------------------------------------------------------------------------------------- known answers
+
+TEST(JointProblem, ARunThatIsSetAsideHasNoPartInIt) {
+  const Trial fitted = fit_baseline(null_problem({"dry_pluck", "wet_pluck", "step_a"}));
+  JointProblem joint = fitted.arrival.joint;
+  const double all = joint.chi2(), own = joint.part({1}).chi2();
+  EXPECT_GT(own, 0);
+  EXPECT_DOUBLE_EQ(joint.part({0, 2}).chi2() + own, all);
+  joint.runs()[1].set_aside(true);
+  EXPECT_DOUBLE_EQ(joint.chi2(), all - own);
+  EXPECT_DOUBLE_EQ(joint.linearise().run_chi2[1], 0);
+  EXPECT_EQ(joint.least_squares().terms.size(), 2u);
+}
 
 TEST(Fit, OfTheCampaignWithoutHiddenEffectsFindsItsRig) {
   const FitResult result = fit(null_problem(five_runs));

@@ -48,6 +48,22 @@ TEST(LeastSquares, RosenbrockFromTheUsualStart) {
   EXPECT_EQ(result.attempts.size(), 1u) << "an easy problem must not pay for restarts";
 }
 
+/// (1 - x)^4 as one residual: Gauss-Newton halves the way at every step.
+TEST(LeastSquares, EndsWhereChiSquareIsEnough) {
+  const LeastSquaresProblem problem = problem_of({named("x", 3)}, 1, [](const VectorXd& x, VectorXd& r, MatrixXd& jacobian) {
+    r << (1 - x[0]) * (1 - x[0]);
+    jacobian << -2 * (1 - x[0]);
+    return true;
+  });
+  LeastSquaresOptions options = to_the_last_digit();
+  options.enough = 1e-3;
+  const LeastSquaresResult early = solve_least_squares(problem, options), late = solve_least_squares(problem, to_the_last_digit());
+  EXPECT_TRUE(early.arrived);
+  EXPECT_LT(early.chi2(), 1e-3);
+  EXPECT_GT(early.chi2(), 1e-6) << "a sixteenth of chi-square at every step: not further than needed, with a few steps to spare";
+  EXPECT_LT(late.chi2(), 1e-6);
+}
+
 TEST(LeastSquares, HeldUnknownsStay) {
   const Line line;
   LeastSquaresProblem problem = linear({named("offset", 0), named("slope", 7)}, line.a, line.y);
