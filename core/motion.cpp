@@ -240,6 +240,59 @@ std::vector<bool> isolated_spikes(const VectorXd& x, double sigma, const std::ve
   return spike;
 }
 
+namespace {
+
+/// A motion that hardly stands out of the noise shows its steepest part only. It lasts some two and a half times as long as its height takes at its steepest (a smooth step of the seventh degree 2.2 times).
+void widen(std::vector<Interval>& intervals, const VectorXd& smooth, Index reach, double hardly) {
+  constexpr double times = 2.5;
+  constexpr Index gap = 10, level = 40;  // samples: between a motion and its levels, and of these
+  const Index n = smooth.size();
+  for (std::size_t i = 0; i < intervals.size(); ++i) {
+    Interval& moves = intervals[i];
+    double steepest = 0;
+    for (Index k = moves.first; k < moves.last; ++k) steepest = std::max(steepest, std::abs(smooth[k + reach] - smooth[k - reach]));
+    const Index before = i > 0 ? intervals[i - 1].last : 0, behind = i + 1 < intervals.size() ? intervals[i + 1].first : n;
+    if (!(steepest < hardly) || moves.first - before < gap + level || behind - moves.last < gap + level) continue;
+    const double height = std::abs(smooth.segment(moves.last + gap, level).mean() - smooth.segment(moves.first - gap - level, level).mean());
+    const Index middle = (moves.first + moves.last) / 2, half = static_cast<Index>(times / 2 * height / steepest * static_cast<double>(2 * reach));
+    moves.first = std::max(before, std::min(moves.first, middle - half));
+    moves.last = std::min(behind, std::max(moves.last, middle + half));
+  }
+}
+
+/// Slow motions far from those that are known: means over `m` samples that differ from those before by more than chance, and by more than what a channel that wanders does everywhere.
+std::vector<Interval> moving_slowly(const VectorXd& angle, double sigma, Index m, const std::vector<Interval>& known) {
+  constexpr Index beside = 500;  // samples: how a motion begins and ends softly is for others to see
+  constexpr std::size_t enough = 40;
+  constexpr double chance = 8, normal = 1.4826;  // standard deviations; of a normal distribution in its median absolute deviation
+  const Index n = angle.size();
+  VectorXd sum = VectorXd::Zero(n + 1);
+  for (Index k = 0; k < n; ++k) sum[k + 1] = sum[k] + angle[k];
+  const auto near_known = [&](Index k) { return std::any_of(known.begin(), known.end(), [&](const Interval& i) { return k + m + beside > i.first && k - m - beside < i.last; }); };
+  std::vector<Index> at;
+  std::vector<double> change;
+  for (Index k = m; k + m <= n; k += m / 4) {
+    if (near_known(k)) continue;
+    at.push_back(k);
+    change.push_back(std::abs(sum[k + m] - 2 * sum[k] + sum[k - m]) / static_cast<double>(m));
+  }
+  if (change.size() < enough) return {};
+  std::vector<double> sorted = change;
+  const double scatter = std::max(sigma * std::sqrt(2 / static_cast<double>(m)), normal * median(sorted));
+  std::vector<Interval> intervals;
+  for (std::size_t i = 0; i < at.size(); ++i) {
+    if (!(change[i] > chance * scatter)) continue;
+    const Interval found{at[i] - m / 2, at[i] + m / 2};
+    if (!intervals.empty() && found.first <= intervals.back().last)
+      intervals.back().last = found.last;
+    else
+      intervals.push_back(found);
+  }
+  return intervals;
+}
+
+}  // namespace
+
 std::vector<Interval> moving(const VectorXd& angle, double sigma) {
   const Index n = angle.size();
   VectorXd smooth(n);
@@ -253,6 +306,16 @@ std::vector<Interval> moving(const VectorXd& angle, double sigma) {
       intervals.back().last = k + 1;
     else
       intervals.push_back({k, k + 1});
+  }
+  for (Index k = 1; k < n; ++k)
+    if (!std::isfinite(smooth[k])) smooth[k] = smooth[k - 1];
+  if (!smooth.allFinite()) return intervals;
+  constexpr double hardly = 18;
+  widen(intervals, smooth, reach, hardly * sigma);
+  for (const Index m : {16, 64, 256}) {
+    const std::vector<Interval> slow = moving_slowly(smooth, sigma, m, intervals);
+    intervals.insert(intervals.end(), slow.begin(), slow.end());
+    std::sort(intervals.begin(), intervals.end(), [](const Interval& a, const Interval& b) { return a.first < b.first; });
   }
   return intervals;
 }

@@ -40,8 +40,9 @@ LinearSystem lag_system(const VectorXd& rate, double U, double b, const RowVecto
 /// State of the lags and the motion over the record, and how it moves with the motion's unknowns.
 class Lags {
  public:
-  Lags(const LinearSystem& system, const ExactStep& step, const MotionBasis& motion, const VectorXd& unknowns)
-      : system_(system), step_(step), motion_(motion), moves_(motion_of(motion.coefficients(unknowns), step.dt)), phases_(motion.phases()) {
+  Lags(const LinearSystem& system, const ExactStep& step, const MotionBasis& motion, const VectorXd& unknowns, const RigidLoad::State& from)
+      : system_(system), step_(step), motion_(motion), moves_(motion_of(motion.coefficients(unknowns), step.dt)), phases_(motion.phases()), from_(from.value.size() > 0 ? from.value : VectorXd::Zero(system.states())), from_by_theta_(from.by_theta.size() > 0 ? from.by_theta : MatrixXd(system.states(), 0)) {
+    moves_.angle.array() += from_[system.motion];
     Index longest = 0;
     for (const MotionBasis::Phase& phase : phases_)
       if (phase.moving) longest = std::max(longest, phase.samples.length());
@@ -56,7 +57,7 @@ class Lags {
     system.C = DualMatrix(rows);
     const FreeResponse free(system, step_, Partials::none);
     MatrixXd all(motion_.samples(), rows.rows());
-    DualMatrix state(MatrixXd::Zero(system.states(), 1));
+    DualMatrix state{MatrixXd(from_)};
     for (const MotionBasis::Phase& phase : phases_) {
       const Interval& s = phase.samples;
       const Response response = phase.moving ? drive(system, step_, state, s.length(), moves_.jerk.segment(s.first, s.length()), {}, Partials::none) : free.from(state, s.length());
@@ -67,12 +68,13 @@ class Lags {
     return all;
   }
 
-  /// Hands `take` the state and its slope, states x unknowns, at these ascending samples, with the place of each among them.
+  /// Hands `take` the state and its slope, states x (unknowns, then theta by way of where it began), at these ascending samples, with the place of each among them. Returns both behind the last sample.
   template <class Take>
-  void at(const std::vector<Index>& samples, Take take) const {
+  std::pair<VectorXd, MatrixXd> at(const std::vector<Index>& samples, Take take) const {
     const Index n = system_.states();
-    VectorXd state = VectorXd::Zero(n);
-    MatrixXd slope = MatrixXd::Zero(n, motion_.unknowns());
+    VectorXd state = from_;
+    MatrixXd slope = MatrixXd::Zero(n, motion_.unknowns() + from_by_theta_.cols());
+    slope.rightCols(from_by_theta_.cols()) = from_by_theta_;
     std::size_t next = 0;
     for (const MotionBasis::Phase& phase : phases_) {
       const Interval& s = phase.samples;
@@ -85,7 +87,9 @@ class Lags {
       const auto behind = [&](Index sample) -> std::pair<VectorXd, MatrixXd> {
         const MatrixXd leap = exact_step(system_, step_.dt * static_cast<double>(sample - s.first)).transition.value;
         if (!phase.moving) return {leap * state, leap * slope};
-        return {states.row(sample - s.first).transpose(), leap * slope + own_splines(s, sample)};
+        MatrixXd its_slope = leap * slope;
+        its_slope.leftCols(motion_.unknowns()) += own_splines(s, sample);
+        return {states.row(sample - s.first).transpose(), std::move(its_slope)};
       };
       for (; next < samples.size() && samples[next] < s.last; ++next) {
         const auto [there, its_slope] = behind(samples[next]);
@@ -96,8 +100,11 @@ class Lags {
       MatrixXd column = state;
       stand_still(column, system_.motion, moves_.angle.segment(s.last, 1));
       state = column.col(0);
-      stand_still(slope, system_.motion, motion_.angle_columns({s.last, s.last + 1}));
+      RowVectorXd angle(slope.cols());
+      angle << motion_.angle_columns({s.last, s.last + 1}), from_by_theta_.row(system_.motion);
+      stand_still(slope, system_.motion, angle);
     }
+    return {state, slope};
   }
 
  private:
@@ -127,13 +134,15 @@ class Lags {
   const MotionBasis& motion_;
   Motion moves_;
   std::vector<MotionBasis::Phase> phases_;
+  VectorXd from_;           // state at the first sample
+  MatrixXd from_by_theta_;
   MatrixXd unit_, summed_;  // states after a unit spline, and their running sum
 };
 
 }  // namespace
 
 RigidLoad rigid_load(const AeroelasticModel& model, const Conditions& conditions, const VectorXd& theta, const MotionBasis& motion, double dt,
-                     const VectorXd& u, std::vector<Index> slopes_at) {
+                     const VectorXd& u, std::vector<Index> slopes_at, const RigidLoad::State& from) {
   const Rig& rig = model.rig();
   if (rig.is_modal()) throw std::invalid_argument("a modal rig has no section to load");
   const double b = rig.semichord(), U = conditions.speed, length = rig.strip_length * static_cast<double>(rig.submerged.size());
@@ -160,7 +169,7 @@ RigidLoad rigid_load(const AeroelasticModel& model, const Conditions& conditions
   MatrixXd loads(2, n);
   loads << slope * strength * built_up, slope * strength * built_up + ca * inertial + centrifugal;
 
-  const Lags state(lags, step, motion, u);
+  const Lags state(lags, step, motion, u, from);
   const MatrixXd all = state.follow(loads);
   RigidLoad load;
   load.circulatory = all.col(0);
@@ -175,16 +184,21 @@ RigidLoad rigid_load(const AeroelasticModel& model, const Conditions& conditions
   load.normal_force_by_motion.resizeLike(load.circulatory_by_motion);
   load.circulatory_by_theta = MatrixXd::Zero(rows, theta.size());
   load.normal_force_by_theta = MatrixXd::Zero(rows, theta.size());
-  state.at(slopes_at, [&](Index i, const VectorXd& x, const MatrixXd& by_motion) {
-    load.circulatory_by_motion.row(i).noalias() = loads.row(0) * by_motion;
-    load.normal_force_by_motion.row(i).noalias() = loads.row(1) * by_motion;
+  const Index unknowns = motion.unknowns(), carried = from.by_theta.cols();
+  const auto [behind, behind_slope] = state.at(slopes_at, [&](Index i, const VectorXd& x, const MatrixXd& its_slope) {
+    load.circulatory_by_motion.row(i).noalias() = loads.row(0) * its_slope.leftCols(unknowns);
+    load.normal_force_by_motion.row(i).noalias() = loads.row(1) * its_slope.leftCols(unknowns);
     const VectorXd still_missing = missing * x;
     for (Index k = 0; k < lags.lags; ++k)
       if (const Index parameter = model.circulation_parameter(k); parameter >= 0) load.circulatory_by_theta(i, parameter) = slope * strength * still_missing[k];
     load.circulatory_by_theta(i, model.index("normal_force_slope")) = strength * built_up.dot(x);
     load.normal_force_by_theta.row(i) = load.circulatory_by_theta.row(i);
     load.normal_force_by_theta(i, model.index("apparent_mass_coefficient")) += inertial.dot(x);
+    if (carried == 0) return;
+    load.circulatory_by_theta.row(i) += loads.row(0) * its_slope.rightCols(carried);
+    load.normal_force_by_theta.row(i) += loads.row(1) * its_slope.rightCols(carried);
   });
+  load.behind = {behind, behind_slope.leftCols(unknowns), behind_slope.rightCols(carried)};
   return load;
 }
 

@@ -2,17 +2,23 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <iterator>
+#include <tuple>
+#include <utility>
 
 #include <fmt/format.h>
 
 #include "core/effects/effect.h"
+#include "core/in_parallel.h"
 #include "core/indicial_table.h"
 #include "core/rigid_load.h"
+#include "core/run_inputs.h"
+#include "correct/knots.h"
 #include "correct/prior.h"
 #include "correct/restless_correction.h"
+#include "correct/run_in_legs.h"
 #include "correct/uncertainty_budget.h"
-#include "fit/motion_prior.h"
 #include "fit/run_residual.h"
 
 namespace unrig {
@@ -68,40 +74,31 @@ AeroelasticModel free_model(const CorrectProblem& problem, double semichords) {
   return model;
 }
 
-/// The windows of the fit, and 40 samples more: a drive that still rings below the noise of the angle is load.
-std::vector<MotionBasis::Window> generous_windows(const Run& run) {
-  constexpr Index more = 40;
-  std::vector<MotionBasis::Window> windows = motion_windows(run);
-  for (std::size_t w = 0; w < windows.size(); ++w) {
-    const Index end = w + 1 < windows.size() ? windows[w + 1].knots.first - 4 * windows[w].stride - 1 : run.samples() - 5;
-    windows[w].knots.last = std::max(windows[w].knots.last, std::min(end, windows[w].knots.last + more));
-  }
-  return windows;
+Searched searched(RunInLegs& legs) {
+  return {[&legs](const VectorXd& theta) { return legs.solve(theta); }, [&legs](const RunResidual::Solution& solution) { return legs.differentiate(solution); }};
 }
 
 /// The best theta with noise levels, roughness of the motion and weight of the regularisation learned on the way.
-Search estimate(RunResidual& residual, const Prior& prior, const VectorXd& start, MatrixXd& rough) {
+Search estimate(RunInLegs& legs, const Prior& prior, const VectorXd& start) {
   constexpr double roughly = 1, well = 1e-3;  // of a chi-square whose own scatter is some tens
-  residual.differentiate_only(prior.free);
+  legs.differentiate_only(prior.free);
   VectorXd theta = start;
-  if (residual.find_linear(theta))  // dry friction that lets go at another time is another minimum: the motion as the angle says, before the gauge has its full say
+  if (RunResidual& whole = legs.residual(0); legs.size() == 1 && whole.find_linear(theta)) {  // dry friction that lets go at another time is another minimum: the motion as the angle says, before the gauge has its full say
     for (const double softer : {30.0, 10.0, 3.0}) {
-      residual.temper(softer);
-      theta = minimise(residual, prior, theta, roughly, false).solution.theta;
+      whole.temper(softer);
+      theta = minimise(whole, prior, theta, roughly, false).solution.theta;
     }
-  residual.temper(1);
-  theta = minimise(residual, prior, theta, roughly, false).solution.theta;
-  residual.settle_noise(theta);
-  residual.reject_spikes(theta);
-  rough = motion_prior(residual, theta);
-  residual.set_motion_prior(rough);
-  return minimise(residual, prior, theta, well, true);
+    whole.temper(1);
+  }
+  theta = minimise(searched(legs), prior, theta, roughly, false).solution.theta;
+  legs.learn_noise_and_motion(theta);
+  return minimise(searched(legs), prior, theta, well, true);
 }
 
 /// The best theta with that imposed on the response, from the best without it; the weight of the regularisation stays.
-Search constrained(const RunResidual& residual, const Search& best, const Imposed& imposed, const VectorXd& semichords) {
+Search constrained(RunInLegs& legs, const Search& best, const Imposed& imposed, const AeroelasticModel& model, const VectorXd& semichords) {
   constexpr double well = 1e-3;
-  Search search = minimise(residual, impose(best.prior, imposed, residual.model(), semichords), best.solution.theta, well, false);
+  Search search = minimise(searched(legs), impose(best.prior, imposed, model, semichords), best.solution.theta, well, false);
   search.determined = best.determined;
   return search;
 }
@@ -149,43 +146,112 @@ double steady_per_reading(const Rig& rig) {  // `check` has seen to the arms
   return static_cast<double>(rig.submerged.size()) / arms;
 }
 
-/// Loads of the rigid rig at theta and c, and how they move at `at`.
-RigidLoad load_at(const RunResidual& residual, const VectorXd& theta, const VectorXd& c, const std::vector<Index>& at) {
-  RigidLoad load = rigid_load(residual.model(), residual.conditions(), theta, residual.motion(), residual.run().dt, c.head(residual.motion().unknowns()), at);
+/// Loads of the rigid rig at theta and c of a leg that goes on `from` the one before, and how they move at `at`.
+RigidLoad load_at(const RunResidual& residual, const VectorXd& theta, const VectorXd& c, const std::vector<Index>& at, const RigidLoad::State& from) {
+  RigidLoad load = rigid_load(residual.model(), residual.conditions(), theta, residual.motion(), residual.run().dt, c.head(residual.motion().unknowns()), at, from);
   const double steady = steady_per_reading(residual.model().rig()) * c[residual.first_offset()];  // the gauge comes first among the channels
   load.circulatory.array() += steady;
   load.normal_force.array() += steady;
   return load;
 }
 
-CorrectedLoad corrected_load(const RunResidual& residual, const UncertaintyBudget& budget, const VectorXd& value, const MatrixXd& by_theta, const MatrixXd& by_motion,
-                             const std::vector<Index>& at) {
+/// Where the rigid rig goes on from behind a leg, with its motion following theta.
+RigidLoad::State going_on(const RigidLoad& load, const MatrixXd& linear_slope) {
+  MatrixXd by_theta = load.behind.by_motion * linear_slope.topRows(load.behind.by_motion.cols());
+  if (load.behind.by_theta.size() > 0) by_theta += load.behind.by_theta;
+  return {load.behind.value, {}, std::move(by_theta)};
+}
+
+/// A load of one leg with its standard deviations in their place in the record; returns the length of its curve.
+double place_load(const RunResidual& residual, const UncertaintyBudget& budget, const Interval& samples, const VectorXd& value, const MatrixXd& by_theta, const MatrixXd& by_motion,
+                  const std::vector<Index>& at, CorrectedLoad& load) {
   MatrixXd by_c = MatrixXd::Zero(by_motion.rows(), residual.linear_unknowns());
   by_c.leftCols(by_motion.cols()) = by_motion;
   by_c.col(residual.first_offset()).setConstant(steady_per_reading(residual.model().rig()));
   const UncertaintyBySource u = budget.of(by_theta, by_c);
-  return {value, interpolated(u.std, at, value.size()), interpolated(u.by_source, at, value.size()), u.simultaneous, {}, {}};
+  load.value.segment(samples.first, samples.length()) = value;
+  load.std.segment(samples.first, samples.length()) = interpolated(u.std, at, value.size());
+  load.by_source.middleRows(samples.first, samples.length()) = interpolated(u.by_source, at, value.size());
+  return u.length;
+}
+
+/// Both loads over the whole record. `budget_of`: of a leg.
+void set_loads(const RunInLegs& legs, const std::vector<RunResidual::Evaluation>& by_leg, const std::function<UncertaintyBudget(std::size_t leg)>& budget_of, const VectorXd& theta, CorrectResult& result) {
+  const Index n = legs.samples(legs.size() - 1).last;
+  for (CorrectedLoad* load : {&result.circulatory, &result.normal_force}) *load = {VectorXd(n), VectorXd(n), MatrixXd(n, sources), 0, {}, {}};
+  std::vector<RigidLoad::State> from(1);
+  for (std::size_t p = 0; p + 1 < legs.size(); ++p) from.push_back(going_on(load_at(legs.residual(p), theta, by_leg[p].linear, {0}, from[p]), by_leg[p].linear_slope));
+  VectorXd circulatory(legs.size()), normal_force(legs.size());  // lengths of their curves
+  in_parallel(legs.size(), [&](std::size_t p) {
+    const RunResidual& residual = legs.residual(p);
+    const UncertaintyBudget budget = budget_of(p);
+    const std::vector<Index> at = chosen_samples(residual.motion());
+    const RigidLoad load = load_at(residual, theta, by_leg[p].linear, at, from[p]);
+    circulatory[static_cast<Index>(p)] = place_load(residual, budget, legs.samples(p), load.circulatory, load.circulatory_by_theta, load.circulatory_by_motion, at, result.circulatory);
+    normal_force[static_cast<Index>(p)] = place_load(residual, budget, legs.samples(p), load.normal_force, load.normal_force_by_theta, load.normal_force_by_motion, at, result.normal_force);
+  });
+  result.circulatory.simultaneous = simultaneous_factor_of_length(circulatory.sum());
+  result.normal_force.simultaneous = simultaneous_factor_of_length(normal_force.sum());
+}
+
+/// Both loads in turn, at theta and the legs' c.
+std::pair<VectorXd, VectorXd> loads_at(const RunInLegs& legs, const VectorXd& theta, const std::vector<VectorXd>& c) {
+  const Index n = legs.samples(legs.size() - 1).last;
+  VectorXd circulatory(n), normal_force(n);
+  RigidLoad::State from;
+  for (std::size_t p = 0; p < legs.size(); ++p) {
+    const RigidLoad load = load_at(legs.residual(p), theta, c[p], {0}, from);
+    circulatory.segment(legs.samples(p).first, legs.samples(p).length()) = load.circulatory;
+    normal_force.segment(legs.samples(p).first, legs.samples(p).length()) = load.normal_force;
+    from = load.behind;
+  }
+  return {circulatory, normal_force};
+}
+
+/// What an error of the calibration does where a run is in legs, which hand it on to each other.
+void add_calibration(const RunInLegs& legs, const std::vector<RunResidual::Evaluation>& by_leg, const std::vector<VectorXd>& answers, const VectorXd& theta, CorrectResult& result) {
+  constexpr double small = 1e-3;
+  std::vector<VectorXd> c;
+  for (std::size_t p = 0; p < legs.size(); ++p) c.push_back(by_leg[p].linear + small * answers[p].tail(by_leg[p].linear.size()));
+  const auto [circulatory, normal_force] = loads_at(legs, theta + small * answers.front().head(theta.size()), c);
+  const auto add = [&](const VectorXd& there, CorrectedLoad& load) {
+    load.by_source.col(static_cast<Index>(Source::calibration)) = result.calibration_uncertainty / small * (there - load.value).cwiseAbs();
+    load.std = load.by_source.rowwise().norm();
+  };
+  add(circulatory, result.circulatory);
+  add(normal_force, result.normal_force);
 }
 
 /// The answers at half and at twice the weight of the regularisation, by one step from the best.
-void vary_weight(const RunResidual& residual, const Search& best, CorrectResult& result) {
+void vary_weight(const RunInLegs& legs, const std::vector<RunResidual::Evaluation>& by_leg, const Search& best, const AeroelasticModel& model, CorrectResult& result) {
   const VectorXd& theta = best.solution.theta;
   for (const bool half : {true, false}) {
     Prior prior = best.prior;
     prior.amplitude *= half ? std::sqrt(2.0) : std::sqrt(0.5);
     const VectorXd move = gauss_newton_step(best.evaluation, prior, theta);
-    const RigidLoad load = load_at(residual, theta + move, best.evaluation.linear + best.evaluation.linear_slope * move, {0});
-    (half ? result.circulatory.half_weight : result.circulatory.twice_weight) = load.circulatory;
-    (half ? result.normal_force.half_weight : result.normal_force.twice_weight) = load.normal_force;
-    (half ? result.indicial.half_weight : result.indicial.twice_weight) = indicial_values(residual.model(), theta + move, result.indicial.semichords);
+    std::vector<VectorXd> c;
+    for (const RunResidual::Evaluation& e : by_leg) c.push_back(e.linear + e.linear_slope * move);
+    std::tie(half ? result.circulatory.half_weight : result.circulatory.twice_weight, half ? result.normal_force.half_weight : result.normal_force.twice_weight) = loads_at(legs, theta + move, c);
+    (half ? result.indicial.half_weight : result.indicial.twice_weight) = indicial_values(model, theta + move, result.indicial.semichords);
   }
 }
 
-/// Where the angle has made its first 0.3 %.
-double onset_of(const Motion& motion, const Run& run) {
+/// What is left of the gauge's readings; where the angle has made its first 0.3 %, and where it ends.
+void describe_motion(const RunInLegs& legs, const VectorXd& theta, const Run& run, CorrectResult& result) {
+  VectorXd angle(run.samples());
+  double level = 0;
+  result.unexplained = result.gauge;
+  for (std::size_t p = 0; p < legs.size(); ++p) {
+    const RunResidual::Prediction prediction = legs.residual(p).predict(theta);
+    const Interval& s = legs.samples(p);
+    result.unexplained.segment(s.first, s.length()) -= prediction.output.col(0);
+    angle.segment(s.first, s.length()) = prediction.motion.angle.array() + level;
+    level = angle[s.last - 1];
+  }
   Index first = 0;
-  while (first + 1 < motion.angle.size() && std::abs(motion.angle[first]) < 3e-3 * motion.angle.cwiseAbs().maxCoeff()) ++first;
-  return run.time(first);
+  while (first + 1 < angle.size() && std::abs(angle[first]) < 3e-3 * angle.cwiseAbs().maxCoeff()) ++first;
+  result.step = level;
+  result.onset = run.time(first);
 }
 
 void describe_run(const CorrectProblem& problem, CorrectResult& result) {
@@ -221,42 +287,35 @@ void look_at_what_is_left(const Run& run, CorrectResult& result) {
                                           run.file, result.reduced_chi2));
 }
 
-/// Knots of the motion this far apart still hold the bands in tests/studies/CORRECT.md. A shaft that moves and rests by turns moves fast: a step within 20 samples with a knot on every seventh is off by
-/// tens of standard deviations.
-Index farthest_knots(const std::vector<MotionBasis::Window>& windows) { return windows.size() > 1 ? 1 : 3; }  // samples
-
-/// And so far that what a nonlinear force does to a long motion is hardly in the load; the acceleration of an oscillation is off by (omega h)^2 / 12.
+/// Knots so far apart that what a nonlinear force does to a long motion is hardly in the load; the acceleration of an oscillation is off by (omega h)^2 / 12.
 constexpr Index farthest_at_all = 8;
 
-bool too_far_apart(const std::vector<MotionBasis::Window>& windows) { return windows.front().stride > farthest_knots(windows); }
-
-bool hardly_rests(const Run& run, const std::vector<MotionBasis::Window>& windows) {
+bool hardly_rests(const Run& run, const Windows& windows) {
   constexpr double most = 0.5;
   Index moving = 0;
   for (const MotionBasis::Window& w : windows) moving += w.knots.length();
   return static_cast<double>(moving) > most * static_cast<double>(run.samples());
 }
 
-Index most_moving(const std::vector<MotionBasis::Window>& windows) { return farthest_knots(windows) * most_knots(windows.size()); }
-
-std::string knots_too_far_apart(const Run& run, const std::vector<MotionBasis::Window>& windows) {
+std::string knots_too_far_apart(const Run& run, const Windows& windows) {
   const Index stride = windows.front().stride;
   return fmt::format("{}: the fit names a nonlinear force, and the shaft moves for so long in all that the {} knots of its motion lie {} samples apart ({:.3g} ms). What it does faster is missing from the load, and the "
                      "band is too narrow while it moves. Correct the run in parts in which it moves for at most {} samples.",
                      run.file, most_knots(windows.size()), stride, 1e3 * static_cast<double>(stride) * run.dt, most_moving(windows));
 }
 
-/// The settled filter is for linear rigs: a nonlinear force has to do with the knots there are, and is told so.
-bool goes_from_sample_to_sample(const AeroelasticModel& model, const Run& run, const VectorXd& theta, const std::vector<MotionBasis::Window>& windows, std::vector<std::string>& warnings) {
-  if (!too_far_apart(windows)) return false;
+/// The legs in which the run is followed; none where it is followed from sample to sample. Both are for linear rigs: a nonlinear force has to do with the knots there are, and is told so.
+std::vector<Windows> legs_to_follow(const AeroelasticModel& model, const Run& run, const VectorXd& theta, const Windows& windows, std::vector<std::string>& warnings) {
+  if (!too_far_apart(windows)) return {windows};
+  const Conditions conditions = conditions_of(run);
+  if (model.system(conditions, theta, model.output_channels(run)).feedback.empty()) return run_inputs(run, conditions).cols() > 0 ? std::vector<Windows>{} : legs_of(windows);
   const Index most_at_all = farthest_at_all * most_knots(windows.size());
-  if (model.system(conditions_of(run), theta, model.output_channels(run)).feedback.empty()) return true;
   if (windows.front().stride > farthest_at_all && hardly_rests(run, windows))
     throw NoAnswer(fmt::format("{}: the shaft moves nearly all the time, for longer than {} samples, and the fit names a nonlinear force. Such a motion is followed by {} knots, which lie too far apart here: "
                                "correct the run in parts of at most {} samples that begin at rest",
                                run.file, most_at_all, most_knots(windows.size()), most_at_all));
   warnings.push_back(knots_too_far_apart(run, windows));
-  return false;
+  return {windows};
 }
 
 }  // namespace
@@ -267,7 +326,7 @@ CorrectResult correct(const CorrectProblem& problem) {
   CorrectResult result;
   describe_run(problem, result);
 
-  const std::vector<MotionBasis::Window> windows = generous_windows(run);
+  const Windows windows = generous_windows(run);
   if (windows.empty()) throw NoAnswer(fmt::format("{}: the angle does not move by more than its noise; nothing can be said about how circulation builds up", run.file));
   const VectorXd& alpha = run.channel("alpha").value;
   const auto onset = static_cast<double>(moving(alpha, noise_level(alpha)).front().first);
@@ -276,47 +335,47 @@ CorrectResult correct(const CorrectProblem& problem) {
   const VectorXd start = theta_for(model, problem.fit, run.file, conditions_of(run).onset_angle);
   const Prior prior = prior_of(model, problem.fit, start, run.file);
   if (length < shortest_response) result.warnings.push_back(too_short_for_a_limit(run, length));
-  if (goes_from_sample_to_sample(model, run, start, windows, result.warnings)) {
+  const std::vector<Windows> windows_by_leg = legs_to_follow(model, run, start, windows, result.warnings);
+  if (windows_by_leg.empty()) {
     correct_restless({model, run, prior, start, length, steady_per_reading(problem.rig), problem.imposed}, result);
     look_at_what_is_left(run, result);
     return result;
   }
 
-  RunResidual residual(model, run, windows);
-  residual.follow_in(problem.fit.law_steps);
-  MatrixXd rough;
-  const Search free = estimate(residual, prior, start, rough);
-  const Search best = problem.imposed.any() ? constrained(residual, free, problem.imposed, response_semichords(length)) : free;
+  RunInLegs legs(model, run, windows_by_leg);
+  legs.residual(0).follow_in(problem.fit.law_steps);
+  const Search free = estimate(legs, prior, start);
+  const Search best = problem.imposed.any() ? constrained(legs, free, problem.imposed, model, response_semichords(length)) : free;
   const VectorXd& theta = best.solution.theta;
 
-  RunResidual complete = residual;
-  complete.differentiate_only({});
-  const auto budget_at = [&](const Search& search) {
-    const RunResidual::Evaluation e = complete.differentiate(search.solution);
-    result.reduced_chi2 = e.chi2 / static_cast<double>(residual.degrees_of_freedom() - static_cast<Index>(search.prior.free.size()));
-    const double inflation = std::sqrt(std::max(1.0, result.reduced_chi2));
-    return UncertaintyBudget(residual, e, search.prior, rough, result.calibration_uncertainty, inflation);
+  legs.differentiate_only({});
+  RunInLegs::Together together;
+  const auto look_at = [&](const Search& search) {
+    together = legs.look_at(search.solution, search.prior, result.calibration_uncertainty > 0);
+    result.reduced_chi2 = together.all.chi2 / static_cast<double>(legs.degrees_of_freedom() - static_cast<Index>(search.prior.free.size()));
   };
-  if (problem.imposed.any()) result.indicial = indicial_response(model, free.solution.theta, budget_at(free), length, result.semichords_per_second);
-  const UncertaintyBudget budget = budget_at(best);
+  const auto budget_of = [&](std::size_t leg, const Prior& by, double calibration) { return legs.budget(leg, together, by, calibration, std::sqrt(std::max(1.0, result.reduced_chi2))); };
+  if (problem.imposed.any()) {
+    look_at(free);
+    result.indicial = indicial_response(model, free.solution.theta, budget_of(0, free.prior, result.calibration_uncertainty), length, result.semichords_per_second);
+  }
+  look_at(best);
+  const UncertaintyBudget of_theta = budget_of(0, best.prior, result.calibration_uncertainty);
+  const std::vector<RunResidual::Evaluation>& by_leg = legs.by_leg(best.solution);
 
-  const std::vector<Index> at = chosen_samples(residual.motion());
-  const RigidLoad load = load_at(residual, theta, best.solution.linear, at);
-  result.circulatory = corrected_load(residual, budget, load.circulatory, load.circulatory_by_theta, load.circulatory_by_motion, at);
-  result.normal_force = corrected_load(residual, budget, load.normal_force, load.normal_force_by_theta, load.normal_force_by_motion, at);
-  IndicialResponse response = indicial_response(model, theta, budget, length, result.semichords_per_second);
+  const bool in_legs = legs.size() > 1;
+  set_loads(legs, by_leg, [&](std::size_t leg) { return in_legs ? budget_of(leg, best.prior, 0) : of_theta; }, theta, result);
+  if (in_legs && result.calibration_uncertainty > 0) add_calibration(legs, by_leg, together.answer_to_reading, theta, result);
+  IndicialResponse response = indicial_response(model, theta, of_theta, length, result.semichords_per_second);
   if (problem.imposed.any()) response.take_tests_of(result.indicial);
   result.indicial = response;
-  vary_weight(residual, best, result);
+  vary_weight(legs, by_leg, best, model, result);
+  describe_motion(legs, theta, run, result);
 
-  const RunResidual::Prediction prediction = residual.predict(theta);
-  result.unexplained = result.gauge - prediction.output.col(0);
-  result.noise = residual.sigma(0);
-  result.step = prediction.motion.angle[prediction.motion.angle.size() - 1];
-  result.onset = onset_of(prediction.motion, run);
+  result.noise = legs.residual(0).sigma(0);
   const Index slope = model.index("normal_force_slope");
   result.slope = theta[slope];
-  result.slope_std = budget.root().row(slope).norm();
+  result.slope_std = of_theta.root().row(slope).norm();
   result.prior_amplitude = best.prior.amplitude;
   result.determined = best.determined;
   result.amplitudes = static_cast<Index>(best.prior.amplitudes.size());

@@ -69,17 +69,40 @@ MatrixXd place(const MatrixXd& part, const std::vector<Index>& at, Index size) {
   return full;
 }
 
+/// Rows of the motion's prior times what stands in the rows of c.
+MatrixXd roughness_of(const MatrixXd& motion_prior, const MatrixXd& c_rows) { return motion_prior.rows() > 0 ? MatrixXd(motion_prior * c_rows) : MatrixXd::Zero(0, c_rows.cols()); }
+
 }  // namespace
 
-UncertaintyBudget::UncertaintyBudget(const RunResidual& residual, const RunResidual::Evaluation& e, const Prior& prior, const MatrixXd& motion_prior,
+ThetaKnown theta_known(const RunResidual& residual, const RunResidual::Evaluation& e, const MatrixXd& motion_prior) {
+  const MatrixXd& S = e.linear_slope;
+  const MatrixXd rough = roughness_of(motion_prior, S);
+  return {S.transpose() * angle_information(residual) * S, rough.transpose() * rough};
+}
+
+MatrixXd theta_root(const RunResidual::Evaluation& e, const Prior& prior) {
+  const MatrixXd known = prior.rows();
+  MatrixXd rows(e.jacobian.rows() + known.rows(), e.jacobian.cols());
+  rows << e.jacobian, known;
+  return place(inverse_root(rows(Eigen::all, prior.free)), prior.free, e.jacobian.cols());
+}
+
+UncertaintyBudget::UncertaintyBudget(const RunResidual& residual, const RunResidual::Evaluation& e, const Prior& prior, const MatrixXd& motion_prior, const std::optional<OtherParts>& others,
                                      double calibration_uncertainty, double inflation)
     : UncertaintyBudget(
           e, prior,
           [&](const MatrixXd& F, const MatrixXd&) -> Shares {
-            const MatrixXd c_rows = F.bottomRows(e.linear.size()), rough = motion_prior.rows() > 0 ? MatrixXd(motion_prior * c_rows) : MatrixXd::Zero(0, F.cols());
-            return {c_rows.transpose() * angle_information(residual) * c_rows, rough.transpose() * rough};
+            const MatrixXd c_rows = F.bottomRows(e.linear.size()), rough = roughness_of(motion_prior, c_rows);
+            Shares shares{c_rows.transpose() * angle_information(residual) * c_rows, rough.transpose() * rough};
+            if (others) {
+              const MatrixXd theta_rows = F.topRows(e.jacobian.cols());
+              shares.angle += theta_rows.transpose() * others->known.angle * theta_rows;
+              shares.roughness += theta_rows.transpose() * others->known.roughness * theta_rows;
+            }
+            return shares;
           },
           [&](const MatrixXd& F, const MatrixXd& gauge) -> VectorXd {
+            if (others) return others->answer_to_reading;
             VectorXd reading = VectorXd::Zero(F.cols());  // (0, c) in the coordinates of F
             const Index unknowns = e.linear.size();
             reading.tail(unknowns) = F.bottomRightCorner(unknowns, unknowns).colPivHouseholderQr().solve(e.linear);
@@ -91,14 +114,11 @@ UncertaintyBudget::UncertaintyBudget(const RunResidual::Evaluation& e, const Pri
                                      double inflation) {
   const Index parameters = e.jacobian.cols(), unknowns = e.linear.size();
   // H^-1 = F F^T over (theta, c), with c = slope theta + what is left of it at given theta.
-  const MatrixXd known = prior.rows();
-  MatrixXd rows(e.jacobian.rows() + known.rows(), parameters);
-  rows << e.jacobian, known;
-  const MatrixXd theta_root = place(inverse_root(rows(Eigen::all, prior.free)), prior.free, parameters);
-  const Index thetas = theta_root.cols();
+  const MatrixXd root_of_theta = theta_root(e, prior);
+  const Index thetas = root_of_theta.cols();
   MatrixXd F = MatrixXd::Zero(parameters + unknowns, thetas + unknowns);
-  F.topLeftCorner(parameters, thetas) = theta_root;
-  F.bottomLeftCorner(unknowns, thetas) = e.linear_slope * theta_root;
+  F.topLeftCorner(parameters, thetas) = root_of_theta;
+  F.bottomLeftCorner(unknowns, thetas) = e.linear_slope * root_of_theta;
   F.bottomRightCorner(unknowns, unknowns) = inverse_root(e.linear_factor);
 
   // Shares F^T I_s F; the gauge's is what is left of the identity.
@@ -119,7 +139,7 @@ UncertaintyBudget::UncertaintyBudget(const RunResidual::Evaluation& e, const Pri
   source(Source::rig) = root_of_share(rig);
   if (!prior.held.empty()) {
     const MatrixXd held = e.jacobian(Eigen::all, prior.held) * prior.held_root;
-    const MatrixXd answer = place(prior.held_root, prior.held, parameters) - theta_root * (theta_root.transpose() * e.jacobian.transpose() * held);
+    const MatrixXd answer = place(prior.held_root, prior.held, parameters) - root_of_theta * (root_of_theta.transpose() * e.jacobian.transpose() * held);
     source(Source::rig).resize(parameters + unknowns, held.cols());
     source(Source::rig) << answer, e.linear_slope * answer;
   }
@@ -151,7 +171,8 @@ UncertaintyBySource UncertaintyBudget::of(const MatrixXd& by_theta, const Matrix
     at += width;
   }
   u.std = u.by_source.rowwise().norm();
-  u.simultaneous = simultaneous_factor(all);
+  u.length = curve_length(all);
+  u.simultaneous = simultaneous_factor_of_length(u.length);
   return u;
 }
 

@@ -2,6 +2,7 @@
 #include <Eigen/Core>
 #include <array>
 #include <functional>
+#include <optional>
 
 #include "correct/prior.h"
 #include "fit/run_residual.h"
@@ -18,7 +19,25 @@ struct UncertaintyBySource {
   Eigen::VectorXd std;          ///< total: root of the sum of squares
   Eigen::MatrixXd by_source;    ///< quantities x sources
   double simultaneous = 0;      ///< all quantities together stay within this many standard deviations with a probability of 95 %
+  double length = 0;            ///< of the curve that they make on the unit sphere (simultaneous_factor_of_length)
 };
+
+/// What the angle and the roughness of the motion say of theta in a part of a run, c eliminated: S' I_s S, S = d c / d theta.
+struct ThetaKnown {
+  Eigen::MatrixXd angle, roughness;
+
+  ThetaKnown operator+(const ThetaKnown& other) const { return {angle + other.angle, roughness + other.roughness}; }
+};
+ThetaKnown theta_known(const RunResidual& residual, const RunResidual::Evaluation& e, const Eigen::MatrixXd& motion_prior);
+
+/// Where a run is in parts, beside one of them: what the others say of theta, and how (theta, c) of this one answer to readings that are all too high by a part of themselves.
+struct OtherParts {
+  ThetaKnown known;
+  Eigen::VectorXd answer_to_reading;
+};
+
+/// Columns over theta whose products with themselves sum to its covariance; zero for what is held.
+Eigen::MatrixXd theta_root(const RunResidual::Evaluation& e, const Prior& prior);
 
 /// The covariance of everything that was estimated from a run, z = (theta, c), split by source.
 ///
@@ -32,7 +51,8 @@ struct UncertaintyBySource {
 /// Noise counts `inflation` fold (the root of the reduced chi-square where that exceeds one).
 class UncertaintyBudget {
  public:
-  UncertaintyBudget(const RunResidual& residual, const RunResidual::Evaluation& e, const Prior& prior, const Eigen::MatrixXd& motion_prior,
+  /// `others`: the other parts of the run, which are in the Jacobian of `e` already; none where it is in one.
+  UncertaintyBudget(const RunResidual& residual, const RunResidual::Evaluation& e, const Prior& prior, const Eigen::MatrixXd& motion_prior, const std::optional<OtherParts>& others,
                     double calibration_uncertainty, double inflation);
 
   /// The same for runs whose c is not all of the linear unknowns: what the angle and the roughness of the motion know, F^T I_s F for H^-1 = F F^T, and how z answers to a

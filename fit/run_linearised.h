@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 #include <memory>
+#include <mutex>
+#include <optional>
 #include <utility>
 #include <vector>
 
@@ -107,7 +109,7 @@ class Block {
   Interval samples;
   bool moving = false;
   Eigen::Index channel = 0;
-  Eigen::MatrixXd start;         ///< d state / d c at the phase's start
+  Eigen::MatrixXd start;         ///< d state / d c at the phase's start; behind it, where the run goes on from another part, the state that it arrived in
   Eigen::MatrixXd rows;          ///< nonlinear systems: d y / d c where the shaft moves, else d y / d state at the phase's start
   Eigen::Index smooth_from = 0;  ///< at rest: the sample from which on whole stretches are polynomials; samples.last where none is
 
@@ -151,6 +153,29 @@ inline Eigen::VectorXd damped_step(const Eigen::MatrixXd& factor, const Eigen::V
 
 }  // namespace run_rows
 
+/// What follows from theta alone and is the same for all parts of a record: the free response without partials (of so many samples), and all responses with them. Kept for the theta that was asked for last.
+struct RunResidual::SharedResponses {
+  struct Rows {
+    Eigen::VectorXd theta;
+    Eigen::Index samples = 0;
+    LinearSystem system;
+    ExactStep step;
+    std::vector<rest_rows::FreeRows> free;
+    Eigen::MatrixXd leap;
+  };
+  struct Slopes {
+    Eigen::VectorXd theta;
+    std::vector<Eigen::Index> differentiated;
+    LinearSystem system;
+    ExactStep step;
+    FreeResponse free;
+    std::optional<rest_rows::SmoothResponse> smooth;  ///< where some part of a rest is looked at so
+  };
+  std::mutex in_use;
+  std::shared_ptr<const Rows> rows;
+  std::shared_ptr<const Slopes> slopes;
+};
+
 /// The model at one theta, without partials: its exact step, what the inputs alone do, where the unknown motion takes the states, and the rows
 /// of the linear unknowns.
 struct RunResidual::Linearised {
@@ -164,6 +189,7 @@ struct RunResidual::Linearised {
   bool polynomials = false;               // whether what is left of a rest may be looked at as polynomials
 
   std::vector<run_rows::Block> blocks;  // phase by phase, channel by channel
+  Eigen::MatrixXd end;                  // as their starts, behind the last sample
 
   /// Solves the stacked rows [c | y] for c, beside a sum of squares that c cannot reach.
   void settle(const std::vector<Eigen::MatrixXd>& rows, Eigen::Index unknowns, double unreachable) {

@@ -38,7 +38,7 @@ RunResidual::Prediction RunResidual::predict(const VectorXd& theta) const {
     const Response response = phase.moving ? drive(lin.system, lin.step, state, s.length(), p.motion.jerk.segment(s.first, s.length()), {}, Partials::none)
                                              : free.from(state, s.length());
     state = response.end;
-    if (phase.moving && s.last < run_->samples()) stand_still(state.value, lin.system.motion, p.motion.angle.segment(s.last, 1));
+    if (phase.moving && s.last < run_->samples()) stand_still(state.value, lin.system.motion, Eigen::RowVectorXd::Constant(1, p.motion.angle[s.last] + arrival_angle(lin.system)));
     p.output.middleRows(s.first, s.length()) = response.output;
   }
   if (lin.known.size() > 0) p.output += lin.known;
@@ -55,7 +55,7 @@ void RunResidual::add_prediction_slope(const Linearised& lin, const run_rows::Bl
     return;
   }
   own.rowwise() += linear_slope.row(first_offset_ + block.channel);
-  MatrixXd state = block.start * linear_slope;
+  MatrixXd state = block.start.leftCols(unknowns_) * linear_slope;
   if (block.rows.size() > 0) {
     own += block.rows * state;
     return;
@@ -113,6 +113,11 @@ RunResidual::Sensitivity RunResidual::sensitivity(const VectorXd& theta) const {
     channel.slope.conservativeResize(n, parameters);
   }
   return result;
+}
+
+RunResidual::Levels RunResidual::levels(const Solution& solution) const {
+  const Index count = unknowns_ - first_offset_;  // they come last
+  return {solution.linear.tail(count), solution.model->eliminate->factor().bottomRightCorner(count, count)};
 }
 
 MatrixXd RunResidual::linear_rows(const VectorXd& theta) const {

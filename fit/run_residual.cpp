@@ -102,7 +102,7 @@ std::vector<MotionBasis::Window> motion_windows(const Run& run) {
 RunResidual::RunResidual(const AeroelasticModel& model, const Run& run, std::vector<MotionBasis::Window> motion, RunOptions options)
     : model_(&model),
       run_(&run),
-      conditions_(conditions_of(run)),
+      conditions_(options.conditions.value_or(conditions_of(run))),
       channels_(model.output_channels(run)),
       motion_(run.samples(), run.dt, motion) {
   conditions_.prescribed_pitch = motion_.unknowns() > 0;
@@ -221,6 +221,17 @@ MatrixXd RunResidual::angle_rows_in_motion(const Interval& s) const {
 void RunResidual::weights_changed() {
   smooth_readings_.clear();
   prepare_angle_rows();
+}
+
+void RunResidual::arrive_in(DualMatrix state) {
+  if (arrival_.rows() == 0 || arrival_.value != state.value) forget_solutions();
+  last_evaluation_ = {};
+  arrival_ = std::move(state);
+}
+
+void RunResidual::share_responses_with(RunResidual& other) {
+  if (!other.shared_) other.shared_ = std::make_shared<SharedResponses>();
+  shared_ = other.shared_;
 }
 
 void RunResidual::set_motion_prior(const MatrixXd& rows) {

@@ -3,6 +3,7 @@
 #include <functional>
 #include <map>
 #include <memory>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -23,6 +24,7 @@ struct Rotated;
 /// How a run is held against the model.
 struct RunOptions {
   Eigen::Index horizon = 0;  ///< samples after the onset (first motion, else the first sample) that count; 0: all of them
+  std::optional<Conditions> conditions = {};  ///< those of the whole record, of a run that is a part of one; none: its own
 };
 
 /// One run against the model: residuals of all fitted channels in units of their own noise, with everything that enters linearly solved for.
@@ -51,6 +53,7 @@ class RunResidual {
     Eigen::VectorXd linear;    ///< c
     Eigen::MatrixXd linear_slope;   ///< d c / d theta, empty for Partials::none
     Eigen::MatrixXd linear_factor;  ///< R with R^T R the information matrix of c at fixed theta, empty for Partials::none
+    DualMatrix departure;           ///< state behind the last sample, n x 1, of a linear model; with c following theta
   };
   Evaluation evaluate(const Eigen::VectorXd& theta, Partials partials) const;
 
@@ -61,6 +64,7 @@ class RunResidual {
     double chi2 = 0;
     Eigen::VectorXd linear;  ///< c
     std::shared_ptr<const Linearised> model;
+    Eigen::VectorXd departure = {};  ///< state behind the last sample, of a linear model
   };
   Solution solve(const Eigen::VectorXd& theta) const;
   Evaluation differentiate(const Solution& solution) const;
@@ -96,6 +100,18 @@ class RunResidual {
     differentiated_ = std::move(parameters);
     last_evaluation_ = {};
   }
+
+  /// Lets a run of a linear model go on from another part of its record: the state at its first sample, known beside what c adds to it, at the next theta that is asked for and with its
+  /// derivatives where derivatives are.
+  void arrive_in(DualMatrix state);
+  /// Offsets of the channels and the angle before the motion, as far as the run has one, and R of what is known of them at fixed theta with the rest of c eliminated.
+  struct Levels {
+    Eigen::VectorXd value;
+    Eigen::MatrixXd factor;
+  };
+  Levels levels(const Solution& solution) const;
+  /// Reckons what is the same for all parts of a record once for itself and another part, of the same model and conditions.
+  void share_responses_with(RunResidual& other);
 
   /// Sample by sample and in units of the noise: what is left, and how the prediction moves with theta while c follows. Left-out samples are 0.
   struct Sensitivity {
@@ -149,6 +165,13 @@ class RunResidual {
   /// a fast signal. Differences do not see a slow mismatch: of first order (the most
   /// efficient), unless those of third order are smaller by more than chance.
   void settle_noise(const Eigen::VectorXd& theta);
+
+  /// All readings but the angle's as if their scale were another.
+  void scale_readings(double factor) {
+    measured_ *= factor;
+    smooth_readings_.clear();
+    forget_solutions();
+  }
 
   /// Lets every fitted channel count as if its noise were `factor` times what it is; replaces an earlier factor. While physics is missing, runs that it is far from
   /// explaining must not drown the others.
@@ -213,8 +236,10 @@ class RunResidual {
   void search_from_the_beginning(Linearised& lin, const Eigen::VectorXd& theta) const;
   void add_prediction_slope(const Linearised& lin, const run_rows::Block& block, const Eigen::MatrixXd& linear_slope, Eigen::MatrixXd& slope) const;
   void prepare_linear(Linearised& lin) const;
+  Eigen::Index longest_phase(bool moving) const;
+  Eigen::Index samples_of_free_response() const;
   using TakeRows = std::function<void(std::size_t block, const Interval& samples, Eigen::MatrixXd rows)>;
-  void follow_partials(const Eigen::VectorXd& theta, const Eigen::VectorXd& linear, const std::vector<run_rows::Block>& blocks, const TakeRows& take) const;
+  DualMatrix follow_partials(const Eigen::VectorXd& theta, const Eigen::VectorXd& linear, const std::vector<run_rows::Block>& blocks, const TakeRows& take) const;
   void follow_nonlinear_partials(const LinearSystem& system, const Eigen::VectorXd& theta, const Eigen::VectorXd& linear, const TakeRows& take) const;
   Eigen::MatrixXd jerk_slope(const Interval& samples) const;
   LinearSystem searched_system(const Eigen::VectorXd& theta) const;
@@ -230,6 +255,7 @@ class RunResidual {
   Interval counted(const MotionBasis::Phase& phase) const;
   Eigen::MatrixXd motion_output_columns(const Linearised& lin, Eigen::Index channel, const Interval& samples) const;
   Eigen::VectorXd initial_state(const Eigen::VectorXd& linear, Eigen::Index states) const;
+  double arrival_angle(const LinearSystem& system) const { return arrival_.rows() > 0 ? arrival_.value(system.motion, 0) : 0; }
   void prepare_angle_rows();
   Eigen::MatrixXd angle_rows_in_motion(const Interval& samples) const;
 
@@ -246,6 +272,9 @@ class RunResidual {
   bool from_afar_ = false, thorough_ = false, aside_ = false;
   Eigen::VectorXd angle_, angle_weight_;
   double angle_sigma_ = 0;
+  struct SharedResponses;
+  std::shared_ptr<SharedResponses> shared_;
+  DualMatrix arrival_;            ///< empty where the run begins of its own
   Eigen::MatrixXd motion_prior_;  ///< [c | 0]
   std::vector<Eigen::MatrixXd> angle_rows_;  ///< [c | angle], weighted; they do not depend on theta
   std::vector<Eigen::Index> differentiated_;

@@ -20,35 +20,51 @@ using run_rows::stacked;
 VectorXd RunResidual::initial_state(const VectorXd& linear, Index states) const {
   VectorXd state = VectorXd::Zero(states);
   for (std::size_t i = 0; i < free_.size(); ++i) state[free_[i]] = linear[first_state_ + static_cast<Index>(i)];
+  if (arrival_.rows() > 0) state += arrival_.value.col(0);
   return state;
 }
 
 Interval RunResidual::counted(const MotionBasis::Phase& phase) const { return {phase.samples.first, std::min(phase.samples.last, last_sample_)}; }
 
+Index RunResidual::longest_phase(bool moving) const {
+  Index longest = 0;
+  for (const MotionBasis::Phase& s : phases_)
+    if (s.moving == moving) longest = std::max(longest, counted(s).length());
+  return longest;
+}
+
 std::shared_ptr<RunResidual::Linearised> RunResidual::linearise(const VectorXd& theta) const {
   auto lin = std::make_shared<Linearised>();
-  lin->system = searched_system(theta);
-  for (DualMatrix* m : {&lin->system.A, &lin->system.B, &lin->system.C, &lin->system.D}) m->partial.clear();
-  lin->step = step_to_follow(lin->system, run_->dt);
-  if (lin->system.feedback.empty()) prepare_linear(*lin);
+  std::unique_lock<std::mutex> lock;
+  if (shared_) lock = std::unique_lock(shared_->in_use);
+  const bool known = shared_ && shared_->rows && shared_->rows->theta == theta && shared_->rows->samples == samples_of_free_response();
+  if (known) {
+    const SharedResponses::Rows& rows = *shared_->rows;
+    lin->system = rows.system, lin->step = rows.step, lin->free = rows.free, lin->leap = rows.leap;
+  } else {
+    lin->system = searched_system(theta);
+    for (DualMatrix* m : {&lin->system.A, &lin->system.B, &lin->system.C, &lin->system.D}) m->partial.clear();
+    lin->step = step_to_follow(lin->system, run_->dt);
+  }
+  if (!lin->system.feedback.empty()) return lin;
+  prepare_linear(*lin);
+  if (shared_ && !known) shared_->rows = std::make_shared<const SharedResponses::Rows>(SharedResponses::Rows{theta, samples_of_free_response(), lin->system, lin->step, lin->free, lin->leap});
   return lin;
 }
+
+Index RunResidual::samples_of_free_response() const { return std::max(std::min(longest_phase(false), rest_rows::stretch_samples), longest_phase(true)); }
 
 /// Responses that the rows of a linear system are made of.
 void RunResidual::prepare_linear(Linearised& lin) const {
   if (inputs_.cols() > 0)
     lin.known = drive(lin.system, lin.step, DualMatrix(MatrixXd::Zero(lin.system.states(), 1)), run_->samples(), {}, inputs_, Partials::none).output;
-  Index longest_rest = 0, longest_motion = 0;
-  for (const MotionBasis::Phase& s : phases_) {
-    Index& longest = s.moving ? longest_motion : longest_rest;
-    longest = std::max(longest, counted(s).length());
+  if (lin.free.empty()) {
+    for (MatrixXd& rows : free_response_rows(lin.system, lin.step, samples_of_free_response())) lin.free.emplace_back(std::move(rows));
+    lin.leap = power(lin.step.transition.value, rest_rows::stretch_samples);
   }
-  const Index samples = std::max(std::min(longest_rest, rest_rows::stretch_samples), longest_motion);
-  for (MatrixXd& rows : free_response_rows(lin.system, lin.step, samples)) lin.free.emplace_back(std::move(rows));
-  lin.leap = power(lin.step.transition.value, rest_rows::stretch_samples);
   lin.polynomials = inputs_.cols() == 0;
   if (motion_.unknowns() > 0) {
-    lin.spline = spline_states(lin.step, longest_motion + 1);
+    lin.spline = spline_states(lin.step, longest_phase(true) + 1);
     lin.spline_summed = lin.spline;
     for (Index k = 1; k < lin.spline.cols(); ++k) lin.spline_summed.col(k) += lin.spline_summed.col(k - 1);
   }
@@ -94,8 +110,9 @@ MatrixXd RunResidual::state_behind(const Linearised& lin, const MotionBasis::Pha
   MatrixXd behind = power(lin.step.transition.value, samples.length()) * start;
   if (phase.moving && motion_.unknowns() > 0) behind.leftCols(motion_.unknowns()) += motion_state_columns(lin, samples);
   if (phase.moving && samples.last < run_->samples()) {
-    RowVectorXd angle = RowVectorXd::Zero(unknowns_);
+    RowVectorXd angle = RowVectorXd::Zero(start.cols());
     angle.head(motion_.unknowns()) = motion_.angle_columns({samples.last, samples.last + 1});
+    angle.tail(start.cols() - unknowns_).setConstant(arrival_angle(lin.system));
     stand_still(behind, lin.system.motion, angle);
   }
   return behind;
@@ -158,7 +175,7 @@ MatrixXd RunResidual::reach_in_motion(const Linearised& lin, run_rows::Block& bl
   span << motion_output_columns(lin, block.channel, s).middleCols(first, count), free.topLeftCorner(s.length(), n), VectorXd::Ones(s.length());
   span = w.asDiagonal() * span;
   if (span.rows() > 2 * span.cols()) span = block.add_stretch(std::move(span));
-  MatrixXd reach = MatrixXd::Zero(span.rows(), unknowns_);
+  MatrixXd reach = MatrixXd::Zero(span.rows(), block.start.cols());
   reach.middleCols(first, count) = span.leftCols(count);
   if (n > 0) reach += span.middleCols(count, n) * block.start;
   reach.col(first_offset_ + block.channel) += span.rightCols(1);
@@ -195,11 +212,13 @@ const rest_rows::SmoothReadings& RunResidual::smooth_readings(Index channel, con
       .first->second;
 }
 
-/// All rows [c | y], those of phases at rest rotated and cut to what c can reach; solves for c.
+/// All rows [c | y], those of phases at rest rotated and cut to what c can reach; solves for c. What the state that the run arrived in does lies in the span of the free response: it is taken
+/// from the readings behind the rotations.
 void RunResidual::stack_rows(Linearised& lin) const {
   std::vector<MatrixXd> rows;
   double unreachable = 0;
-  MatrixXd start = MatrixXd::Zero(lin.system.states(), unknowns_);
+  MatrixXd start = MatrixXd::Zero(lin.system.states(), unknowns_ + arrival_.cols());
+  start.rightCols(arrival_.cols()) = arrival_.value;
   for (std::size_t i = 0; i < free_.size(); ++i) start(free_[i], first_state_ + static_cast<Index>(i)) = 1;
   for (const MotionBasis::Phase& phase : phases_) {
     const Interval s = counted(phase);
@@ -210,13 +229,15 @@ void RunResidual::stack_rows(Linearised& lin) const {
       const MatrixXd reach = phase.moving ? reach_in_motion(lin, block) : reach_at_rest(lin, block);
       run_rows::Rotated rotated = rotated_readings(lin, block, unreachable);
       MatrixXd together(reach.rows(), unknowns_ + 1);
-      together << reach, block.reached(rotated);
+      together << reach.leftCols(unknowns_), block.reached(rotated);
+      if (arrival_.cols() > 0) together.col(unknowns_) -= reach.col(unknowns_);
       for (const MatrixXd& others : rotated.others) unreachable += others.squaredNorm();
       rows.push_back(std::move(together));
       lin.blocks.push_back(std::move(block));
     }
     start = state_behind(lin, phase, s, start);
   }
+  lin.end = start;
   rows.insert(rows.end(), angle_rows_.begin(), angle_rows_.end());
   lin.settle(rows, unknowns_, unreachable);
 }
@@ -230,7 +251,9 @@ RunResidual::Solution RunResidual::solve(const VectorXd& theta) const {
   }
   stack_rows(*lin);
   last_evaluation_ = {};
-  return last_solution_ = {theta, lin->chi2, lin->linear, lin};
+  VectorXd departure = lin->end.leftCols(unknowns_) * lin->linear;
+  if (arrival_.cols() > 0) departure += lin->end.rightCols(1);
+  return last_solution_ = {theta, lin->chi2, lin->linear, lin, std::move(departure)};
 }
 
 /// The model's system, corners of its laws rounded where they have any.
@@ -270,19 +293,37 @@ MatrixXd slopes_and_prediction(const Response& response, const Response& known, 
 }  // namespace
 
 /// Follows the model with its partials through all phases at fixed c, and hands [d y / d theta | y] of each channel to `take`, piece by piece. Stretches that are
-/// smooth in `blocks` are handed on as coefficients of polynomials; none where there are no blocks.
-void RunResidual::follow_partials(const VectorXd& theta, const VectorXd& linear, const std::vector<run_rows::Block>& blocks, const TakeRows& take) const {
-  const LinearSystem system = differentiable_system(theta);
-  if (!system.feedback.empty()) return follow_nonlinear_partials(system, theta, linear, take);
-  const ExactStep step = exact_step(system, run_->dt);
+/// smooth in `blocks` are handed on as coefficients of polynomials; none where there are no blocks. Returns the state behind the last sample, of a linear model.
+DualMatrix RunResidual::follow_partials(const VectorXd& theta, const VectorXd& linear, const std::vector<run_rows::Block>& blocks, const TakeRows& take) const {
+  std::shared_ptr<const SharedResponses::Slopes> at;
+  if (shared_) {
+    const std::lock_guard lock(shared_->in_use);
+    at = shared_->slopes;
+  }
+  if (!at || at->theta != theta || at->differentiated != differentiated_) {
+    LinearSystem system = differentiable_system(theta);
+    if (!system.feedback.empty()) {
+      follow_nonlinear_partials(system, theta, linear, take);
+      return {};
+    }
+    ExactStep step = exact_step(system, run_->dt);
+    FreeResponse free(system, step, Partials::all);
+    std::optional<rest_rows::SmoothResponse> smooth;
+    if (shared_ || std::any_of(blocks.begin(), blocks.end(), [](const run_rows::Block& block) { return !block.moving && block.smooth_from < block.samples.last; })) smooth.emplace(free);
+    at = std::make_shared<const SharedResponses::Slopes>(SharedResponses::Slopes{theta, differentiated_, std::move(system), std::move(step), std::move(free), std::move(smooth)});
+    if (shared_) {
+      const std::lock_guard lock(shared_->in_use);
+      shared_->slopes = at;
+    }
+  }
+  const auto& [its_theta, differentiated, system, step, free, smooth] = *at;
   const auto parameters = static_cast<Index>(model_->parameters().size());
   const Index channels = measured_.cols();
   Response known;
   if (inputs_.cols() > 0) known = drive(system, step, DualMatrix(MatrixXd::Zero(system.states(), 1)), run_->samples(), {}, inputs_, Partials::all);
-  const FreeResponse free(system, step, Partials::all);
-  std::optional<rest_rows::SmoothResponse> smooth;
   DualMatrix state(MatrixXd::Zero(system.states(), 1), parameters);
   state.value.col(0) = initial_state(linear, system.states());
+  if (arrival_.parameters() > 0) state.partial = arrival_.partial;
   const Motion motion = motion_.unknowns() > 0 ? motion_of(motion_.coefficients(linear.head(motion_.unknowns())), run_->dt) : Motion{};
   std::size_t block = 0;
   for (const MotionBasis::Phase& phase : phases_) {
@@ -292,12 +333,11 @@ void RunResidual::follow_partials(const VectorXd& theta, const VectorXd& linear,
     for (Index first = s.first; first < s.last; first += length) {
       const Interval stretch{first, std::min(first + length, s.last)};
       const bool is_smooth = !blocks.empty() && blocks[block].is_smooth(stretch);
-      if (is_smooth && !smooth) smooth.emplace(free);
       const Response response = is_smooth        ? smooth->from(state)
                                 : phase.moving ? drive(system, step, state, stretch.length(), motion.jerk.segment(first, stretch.length()), {}, Partials::all)
                                                  : free.from(state, stretch.length());
       state = response.end;
-      if (phase.moving && stretch.last < run_->samples()) stand_still(state.value, system.motion, motion.angle.segment(stretch.last, 1));
+      if (phase.moving && stretch.last < run_->samples()) stand_still(state.value, system.motion, RowVectorXd::Constant(1, motion.angle[stretch.last] + arrival_angle(system)));
       for (Index c = 0; c < channels; ++c) {
         MatrixXd m = slopes_and_prediction(response, known, stretch, c, parameters);
         m.col(parameters) += linear[first_offset_ + c] * (is_smooth ? rest_rows::smooth_constant() : VectorXd::Ones(stretch.length()));
@@ -306,6 +346,7 @@ void RunResidual::follow_partials(const VectorXd& theta, const VectorXd& linear,
     }
     block += static_cast<std::size_t>(channels);
   }
+  return state;
 }
 
 namespace {
@@ -332,7 +373,7 @@ RunResidual::Evaluation RunResidual::differentiate(const Solution& solution) con
   if (!std::isfinite(solution.chi2)) return says_nothing(parameters, unknowns_);
   std::vector<run_rows::Rotated> rotated_blocks(lin.blocks.size());
   double beside = 0;
-  follow_partials(solution.theta, solution.linear, lin.blocks, [&](std::size_t b, const Interval& s, MatrixXd m) {
+  DualMatrix departure = follow_partials(solution.theta, solution.linear, lin.blocks, [&](std::size_t b, const Interval& s, MatrixXd m) {
     // Residual and its derivative, weighted: [-d y / d theta | measured - y].
     const run_rows::Block& block = lin.blocks[b];
     m = -m;
@@ -371,6 +412,12 @@ RunResidual::Evaluation RunResidual::differentiate(const Solution& solution) con
   e.jacobian.topRows(triangle.rows()) = triangle.leftCols(parameters);
   e.residual.head(triangle.rows()) = triangle.col(parameters);
   e.chi2 = e.residual.squaredNorm();
+  if (departure.rows() > 0) {
+    const MatrixXd followed = lin.end.leftCols(unknowns_) * e.linear_slope;
+    for (Index j = 0; j < parameters; ++j)
+      if (!followed.col(j).isZero(0)) departure.add_partial(j, followed.col(j));
+    e.departure = std::move(departure);
+  }
   if (!solution.model->system.feedback.empty()) guide_ = {solution.theta, e.linear, e.linear_slope, solution.chi2};
   if (is_last) last_evaluation_ = e;
   return e;

@@ -273,6 +273,31 @@ TEST(Moving, FindsNothingInNoiseAndSpikes) {
   }
 }
 
+TEST(Moving, FindsWhatIsSlow) {
+  // Thirty times the noise in 50 to 1000 samples: a change by less than four of it in six samples, which noise alone may look like.
+  for (const Index rise : {50, 200, 1000}) {
+    VectorXd angle = VectorXd::Constant(2 * length, 2.09) + white_noise(2 * length, 0.01, 51);
+    add_ramp(angle, 2500, rise, 0.3);
+    angle[1200] = nan;
+    const std::vector<Interval> found = moving(angle, 0.01);
+    ASSERT_EQ(found.size(), 1u) << "rise " << rise;
+    EXPECT_LT(found[0].first, 2500 + rise / 2) << rise;
+    EXPECT_GT(found[0].last, 2500 + rise / 2) << rise;
+    EXPECT_GT(found[0].first, 2500 - 300) << rise;
+    EXPECT_LT(found[0].last, 2500 + rise + 300) << rise;
+  }
+}
+
+TEST(Moving, TakesNoWanderingForMotion) {
+  for (unsigned seed = 1; seed <= 10; ++seed) {
+    VectorXd angle = white_noise(10 * length, 0.01, 200 + seed);
+    const VectorXd steps = white_noise(10 * length, 0.0005, 300 + seed);
+    double walk = 0;
+    for (Index k = 0; k < angle.size(); ++k) angle[k] += walk += steps[k] - 0.001 * walk;  // by 0.011, within some thousand samples
+    EXPECT_TRUE(moving(angle, 0.01).empty()) << "seed " << seed;
+  }
+}
+
 TEST(Moving, JoinsWhatNearlyTouches) {
   VectorXd angle = white_noise(length, 0.01, 41);
   add_ramp(angle, 1000, 8, 1);

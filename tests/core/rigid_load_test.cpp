@@ -101,6 +101,29 @@ TEST(RigidLoad, CarriesItsSlopes) {
   EXPECT_LT((load.normal_force_by_motion * u - load.normal_force).norm(), 1e-9 * load.normal_force.norm());
 }
 
+/// A motion in two parts, the second of which goes on from the first: as in one, and with the slopes of what the first hands on.
+TEST(RigidLoad, GoesOnFromAnother) {
+  const AeroelasticModel model = model_of_null(Wagner::jones, AeroelasticModel::Circulation::free);
+  const double dt = 0.002;
+  Conditions conditions;
+  conditions.density = 998.2;
+  conditions.speed = 0.6;
+  const MotionBasis whole(300, dt, {{{10, 30}, 1}, {{150, 170}, 1}}), first(120, dt, {{{10, 30}, 1}}), second(180, dt, {{{30, 50}, 1}});
+  const VectorXd u = VectorXd::LinSpaced(whole.unknowns(), -0.01, 0.02), theta = theta_of(model, 5.9);
+  const Index own = first.unknowns();
+  const RigidLoad expected = rigid_load(model, conditions, theta, whole, dt, u);
+  const RigidLoad begins = rigid_load(model, conditions, theta, first, dt, u.head(own));
+  // As if the motion of the first part followed theta.
+  const Eigen::MatrixXd follows = Eigen::MatrixXd::Random(own, theta.size());
+  const RigidLoad goes_on = rigid_load(model, conditions, theta, second, dt, u.tail(whole.unknowns() - own), {}, {begins.behind.value, {}, begins.behind.by_motion * follows});
+  EXPECT_LT((begins.normal_force - expected.normal_force.head(120)).norm(), 1e-10 * expected.normal_force.norm());
+  EXPECT_LT((goes_on.normal_force - expected.normal_force.tail(180)).norm(), 1e-10 * expected.normal_force.norm());
+  EXPECT_LT((goes_on.circulatory - expected.circulatory.tail(180)).norm(), 1e-10 * expected.circulatory.norm());
+  const Eigen::MatrixXd by_theta = expected.circulatory_by_theta.bottomRows(180) + expected.circulatory_by_motion.bottomRows(180).leftCols(own) * follows;
+  EXPECT_LT((goes_on.circulatory_by_theta - by_theta).norm(), 1e-10 * by_theta.norm());
+  EXPECT_LT((goes_on.normal_force_by_motion - expected.normal_force_by_motion.bottomRows(180).rightCols(whole.unknowns() - own)).norm(), 1e-10 * expected.normal_force_by_motion.norm());
+}
+
 TEST(RigidLoad, OfAShaftAtRestSettles) {
   // Ten minutes after the last of two motions, 4800 semichords: slope times rho U^2 b L times the angle. A rate left over by the splines' rounding would add up.
   const AeroelasticModel model = model_of_null(Wagner::jones);

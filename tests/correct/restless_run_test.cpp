@@ -9,11 +9,9 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
-#include <random>
 
 #include "core/error.h"
-#include "core/simulate.h"
-#include "tests/correct/null_campaign.h"
+#include "tests/correct/recorded_run.h"
 
 namespace unrig {
 namespace {
@@ -23,11 +21,14 @@ using Eigen::VectorXd;
 using std::numbers::pi;
 using ::testing::HasSubstr;
 using ::testing::Contains;
+using test::channel_of;
+using test::record;
+using test::Recorded;
+using test::rms;
+using test::soft;
 
-constexpr double dt = 0.002, gauge_noise = 0.027, angle_noise = 0.01 * pi / 180, slope = 5.86;
-constexpr Index finer = 4;
+constexpr double slope = test::recorded_slope;
 
-double soft(double x) { return x <= 0 ? 0 : x >= 1 ? 1 : x * x * x * (10 - 15 * x + 6 * x * x); }
 double sine(double t) { return 2 * soft((t - 0.2) / 0.3) * std::sin(2 * pi * 1.5 * (t - 0.2)); }
 double many_frequencies(double t) {
   double sum = 0;
@@ -41,53 +42,6 @@ double chirp(double t) {
   const double growth = std::log(last / first);
   return 2 * soft((t - 0.2) / 0.3) * std::sin(2 * pi * first * duration / growth * std::expm1((t - 0.2) / duration * growth));
 }
-
-/// Ten steps of 1.3 degrees in 40 ms, up and down, with rests between.
-double ten_steps(double t) {
-  double angle = 0;
-  for (int i = 0; i < 10; ++i) angle += (i % 2 == 0 ? 1.3 : -1.3) * soft((t - 1 - 1.9 * i) / 0.04);
-  return angle;
-}
-
-struct Recorded {
-  unrig::Run run;
-  VectorXd circulatory, normal_force;
-};
-
-/// Simulated at a quarter of the sampling interval, with Wagner's function.
-Recorded record(double (*angle)(double), Index samples) {
-  const AeroelasticModel model(test::null_rig(), make_basis(test::null_rig(), test::null_fit().normal_modes, test::null_fit().torsion_modes), wagner(Wagner::within_1e6));
-  unrig::Run motion;
-  motion.file = "restless.csv";
-  motion.density = 998.2;
-  motion.speed = 0.6096;
-  motion.dt = dt / finer;
-  VectorXd fine(finer * samples);
-  for (Index k = 0; k < fine.size(); ++k) fine[k] = (2 + angle(motion.time(k))) * pi / 180;
-  motion.channels.push_back({"alpha", "rad", "rad", 1, fine, 0});
-  VectorXd theta = theta_for(model, test::null_fit(), "");
-  theta[model.index("normal_force_slope")] = slope;
-  const SimulateResult truth = simulate({model, theta, motion, PitchBetweenSamples::spline, std::nullopt, 0.2});
-  const auto sampled = [&](const std::string& channel) -> VectorXd {
-    return truth.run.channel(channel).value(Eigen::VectorXi::LinSpaced(samples, 0, static_cast<int>(finer * (samples - 1))));
-  };
-  std::mt19937_64 random(11);
-  std::normal_distribution<double> normal;
-  const auto noisy = [&](VectorXd x, double sigma) {
-    for (double& value : x) value += sigma * normal(random);
-    return x;
-  };
-  Recorded r{motion, sampled("circulatory"), sampled("normal_force")};
-  r.run.dt = dt;
-  r.run.channels = {{"alpha", "rad", "rad", 1, noisy(sampled("alpha"), angle_noise), 0}, {"gauge", "N", "N", 1, noisy(sampled("gauge"), gauge_noise), 0}};
-  return r;
-}
-
-VectorXd& channel_of(unrig::Run& run, const std::string& name) {
-  return std::find_if(run.channels.begin(), run.channels.end(), [&](const Channel& c) { return c.name == name; })->value;
-}
-
-double rms(const VectorXd& x) { return x.norm() / std::sqrt(static_cast<double>(x.size())); }
 
 AeroelasticModel free_circulation() {
   const VectorXd rates{{0.003, 0.03, 0.1, 0.3, 1.2}};
@@ -222,25 +176,6 @@ TEST(Restless, ALongRecordIsFoundPieceByPiece) {
     EXPECT_NEAR(result.slope, slope, 3 * result.slope_std);
     EXPECT_TRUE(result.warnings.empty()) << result.warnings.front();
   }
-}
-
-/// Six hundred knots would lie two samples apart: the load was up to 27 standard deviations off when 400 knots had to do.
-TEST(Restless, StepsThatTheKnotsCannotFollowAreFollowedFromSampleToSample) {
-  const Recorded r = record(&ten_steps, 10000);
-  const CorrectResult result = correct({test::null_rig(), test::null_fit(), r.run, 0});
-  for (const bool circulatory : {true, false}) {
-    const CorrectedLoad& load = circulatory ? result.circulatory : result.normal_force;
-    const VectorXd& truth = circulatory ? r.circulatory : r.normal_force;
-    const VectorXd off = load.value - truth, in_deviations = off.cwiseAbs().cwiseQuotient(load.std);
-    // 0.0017 and 0.006 of the range measured, the band's own width where the shaft rests.
-    EXPECT_LT(rms(off), (circulatory ? 0.0025 : 0.009) * (truth.maxCoeff() - truth.minCoeff()));
-    for (Index tenth = 0; tenth < 10; ++tenth) EXPECT_GT((in_deviations.segment(tenth * 1000, 1000).array() < 1.96).count(), 850) << tenth;
-    EXPECT_LT(in_deviations.maxCoeff(), load.simultaneous + 1);
-  }
-  EXPECT_NEAR(result.reduced_chi2, 1, 0.05);
-  EXPECT_NEAR(result.slope, slope, 3 * result.slope_std);
-  FittedRig fit = with_friction();
-  EXPECT_THAT(correct({test::null_rig(), fit, r.run, 0}).warnings, Contains(HasSubstr("600 knots of its motion lie 2 samples apart")));
 }
 
 TEST(Restless, MissingSamplesCostLittleAndAGapIsNamed) {

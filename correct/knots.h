@@ -1,0 +1,27 @@
+#pragma once
+#include <Eigen/Core>
+#include <vector>
+
+#include "core/motion.h"
+#include "core/run.h"
+
+namespace unrig {
+
+/// Windows in which a shaft may move, in turn.
+using Windows = std::vector<MotionBasis::Window>;
+
+/// The windows of the fit, and 40 samples more: a drive that still rings below the noise of the angle is load.
+Windows generous_windows(const Run& run);
+
+/// Samples that knots in such windows may lie apart for the bands in tests/studies/CORRECT.md to hold. A shaft that moves and rests by turns moves fast: a step within 20 samples with a knot on every
+/// seventh is off by tens of standard deviations.
+Eigen::Index farthest_knots(const Windows& windows);
+bool too_far_apart(const Windows& windows);
+/// Samples in motion that so many windows can follow.
+Eigen::Index most_moving(const Windows& windows);
+
+/// The same windows by legs of a run (correct/run_in_legs.h): of some hundred knots or a single motion, and cut only where the shaft rests for a hundred samples. Empty where a leg has more
+/// motion than its knots can follow.
+std::vector<Windows> legs_of(const Windows& windows);
+
+}  // namespace unrig
