@@ -18,7 +18,7 @@ namespace unrig {
 ///
 ///   chi^2(theta) = sum_p min_(c_p) |W_p (y_p - y(theta, c_p, x_p(theta)))|^2 + min_w |A w - b(theta)|^2,   x_(p+1) = x behind leg p at theta and the best c_p,
 ///
-/// with exact derivatives of x_p. A leg has knots of its own motions, and finds offsets o_p and a level a_p of the angle of its own. The last term says that they are the same in all legs, w = (o, a):
+/// and x_p with its derivatives in theta, c_p following as far as Kaufman's rule knows. A leg has knots of its own motions, and finds offsets o_p and a level a_p of the angle of its own. The last term says that they are the same in all legs, w = (o, a):
 /// o_p - g (a_p - p_p) = o - g a within the errors of its left side, with p_p the shaft's position that the leg arrived in and g what a steady radian reads. A leg that arrived in a position that is a
 /// little off has made up for that by its offset: its reading of the level is good all the same.
 ///
