@@ -126,7 +126,8 @@ RunResidual::Solution RunInLegs::solve(const VectorXd& theta) {
 
 const std::vector<RunResidual::Evaluation>& RunInLegs::by_leg(const RunResidual::Solution& solution) {
   if (size() == 1 && (solutions_.empty() || solutions_.front().model != solution.model)) {
-    solutions_.assign(1, solution);  // where a law is at work c is another search
+    solutions_.clear();
+    solutions_.push_back(solution);  // where a law is at work c is another search
     evaluations_.clear();
   }
   if (solutions_.empty() || solutions_.front().theta != solution.theta) solve(solution.theta);
