@@ -236,6 +236,7 @@ Trial Selection::best_set() {
   while (best.effects.size() < most_effects && what_remains(best).found) {
     best = in_finer_steps(std::move(best));
     if (!what_remains(best).found) break;
+    if (decays_decide(best) && best.reduced_chi2() > twice_the_noise) break;  // trajectories that are not followed tell nothing of a second effect, in minutes each
     if (!sufficient && nonlinear(best) && best.excess() < (1 - enough_to_name) * baseline_.excess() && leaves_nothing(best)) sufficient = best;
     tell(best.effects.empty() ? "trying what may be missing" : "trying what may be missing beside " + best.effects.back());
     Trials tried = try_one_more(best, hopeless);
