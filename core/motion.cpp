@@ -261,10 +261,11 @@ void widen(std::vector<Interval>& intervals, const VectorXd& smooth, Index reach
 }
 
 /// Slow motions far from those that are known: means over `m` samples that differ from those before by more than chance, and by more than what a channel that wanders does everywhere.
-std::vector<Interval> moving_slowly(const VectorXd& angle, double sigma, Index m, const std::vector<Interval>& known) {
+std::vector<Interval> moving_slowly(const VectorXd& angle, double sigma, double quantum, Index m, const std::vector<Interval>& known) {
   constexpr Index beside = 500;  // samples: how a motion begins and ends softly is for others to see
   constexpr std::size_t enough = 40;
   constexpr double chance = 8, normal = 1.4826;  // standard deviations; of a normal distribution in its median absolute deviation
+  constexpr double one_code = 1.5;               // quanta: a quiet converter that changes by one is no motion
   const Index n = angle.size();
   VectorXd sum = VectorXd::Zero(n + 1);
   for (Index k = 0; k < n; ++k) sum[k + 1] = sum[k] + angle[k];
@@ -278,10 +279,10 @@ std::vector<Interval> moving_slowly(const VectorXd& angle, double sigma, Index m
   }
   if (change.size() < enough) return {};
   std::vector<double> sorted = change;
-  const double scatter = std::max(sigma * std::sqrt(2 / static_cast<double>(m)), normal * median(sorted));
+  const double least = std::max(chance * std::max(sigma * std::sqrt(2 / static_cast<double>(m)), normal * median(sorted)), one_code * quantum);
   std::vector<Interval> intervals;
   for (std::size_t i = 0; i < at.size(); ++i) {
-    if (!(change[i] > chance * scatter)) continue;
+    if (!(change[i] > least)) continue;
     const Interval found{at[i] - m / 2, at[i] + m / 2};
     if (!intervals.empty() && found.first <= intervals.back().last)
       intervals.back().last = found.last;
@@ -309,11 +310,14 @@ std::vector<Interval> moving(const VectorXd& angle, double sigma) {
   }
   for (Index k = 1; k < n; ++k)
     if (!std::isfinite(smooth[k])) smooth[k] = smooth[k - 1];
+  for (Index k = n - 2; k >= 0; --k)
+    if (!std::isfinite(smooth[k])) smooth[k] = smooth[k + 1];
   if (!smooth.allFinite()) return intervals;
   constexpr double hardly = 18;
+  const double quantum = std::sqrt(12.0) * rounding_level(angle);
   widen(intervals, smooth, reach, hardly * sigma);
   for (const Index m : {16, 64, 256}) {
-    const std::vector<Interval> slow = moving_slowly(smooth, sigma, m, intervals);
+    const std::vector<Interval> slow = moving_slowly(smooth, sigma, quantum, m, intervals);
     intervals.insert(intervals.end(), slow.begin(), slow.end());
     std::sort(intervals.begin(), intervals.end(), [](const Interval& a, const Interval& b) { return a.first < b.first; });
   }

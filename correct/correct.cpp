@@ -304,11 +304,37 @@ std::string knots_too_far_apart(const Run& run, const Windows& windows) {
                      run.file, most_knots(windows.size()), stride, 1e3 * static_cast<double>(stride) * run.dt, most_moving(windows));
 }
 
+/// Whether every fitted channel has readings in every leg.
+bool all_read(const Run& run, std::vector<std::string> channels, const std::vector<Windows>& legs) {
+  constexpr Index enough = 50;  // samples before its first motion, and behind its last
+  channels.emplace_back("alpha");
+  const Channel* weight = run.find("weight");
+  const auto reads = [&](const VectorXd& value, Index first, Index last) {
+    Index count = 0;
+    for (Index k = std::max<Index>(0, first); k < std::min(run.samples(), last); ++k) count += std::isfinite(value[k]) && (!weight || weight->value[k] > 0) ? 1 : 0;
+    return count >= enough / 2;
+  };
+  for (const std::string& name : channels) {
+    const VectorXd& value = run.channel(name).value;
+    for (const Windows& leg : legs)
+      if (!reads(value, leg.front().knots.first - enough, leg.front().knots.first) || !reads(value, leg.back().knots.last, leg.back().knots.last + enough)) return false;
+  }
+  return true;
+}
+
 /// The legs in which the run is followed; none where it is followed from sample to sample. Both are for linear rigs: a nonlinear force has to do with the knots there are, and is told so.
 std::vector<Windows> legs_to_follow(const AeroelasticModel& model, const Run& run, const VectorXd& theta, const Windows& windows, std::vector<std::string>& warnings) {
   if (!too_far_apart(windows)) return {windows};
   const Conditions conditions = conditions_of(run);
-  if (model.system(conditions, theta, model.output_channels(run)).feedback.empty()) return run_inputs(run, conditions).cols() > 0 ? std::vector<Windows>{} : legs_of(windows);
+  const std::vector<std::string> channels = model.output_channels(run);
+  const LinearSystem system = model.system(conditions, theta, channels);
+  if (system.feedback.empty()) {
+    constexpr Index fewest = 100;          // samples of a rest: a quarter of them before the next motion, for its level
+    constexpr double shortest_rest = 4;  // semichords
+    const Index rest = std::max(fewest, static_cast<Index>(shortest_rest * model.rig().semichord() / run.speed / run.dt));
+    const std::vector<Windows> legs = legs_of(windows, rest);
+    return system.exogenous.empty() && run_inputs(run, conditions).cols() == 0 && all_read(run, channels, legs) ? legs : std::vector<Windows>{};
+  }
   const Index most_at_all = farthest_at_all * most_knots(windows.size());
   if (windows.front().stride > farthest_at_all && hardly_rests(run, windows))
     throw NoAnswer(fmt::format("{}: the shaft moves nearly all the time, for longer than {} samples, and the fit names a nonlinear force. Such a motion is followed by {} knots, which lie too far apart here: "

@@ -24,8 +24,8 @@ bool too_far_apart(const Windows& windows) { return windows.front().stride > far
 
 Index most_moving(const Windows& windows) { return farthest_knots(windows) * most_knots(windows.size()); }
 
-std::vector<Windows> legs_of(const Windows& windows) {
-  constexpr Index knots_in_leg = 150, shortest_rest = 100;
+std::vector<Windows> legs_of(const Windows& windows, Index shortest_rest) {
+  constexpr Index knots_in_leg = 150;
   std::vector<Windows> legs;
   Index knots = 0;
   for (const MotionBasis::Window& w : windows) {

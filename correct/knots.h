@@ -20,8 +20,8 @@ bool too_far_apart(const Windows& windows);
 /// Samples in motion that so many windows can follow.
 Eigen::Index most_moving(const Windows& windows);
 
-/// The same windows by legs of a run (correct/run_in_legs.h): of some hundred knots or a single motion, and cut only where the shaft rests for a hundred samples. Empty where a leg has more
-/// motion than its knots can follow.
-std::vector<Windows> legs_of(const Windows& windows);
+/// The same windows by legs of a run (correct/run_in_legs.h): of some hundred knots, or of the motions between which the shaft does not rest for `shortest_rest` samples. Empty where a leg has more motion
+/// than its knots can follow.
+std::vector<Windows> legs_of(const Windows& windows, Eigen::Index shortest_rest);
 
 }  // namespace unrig

@@ -5,6 +5,9 @@
 #include <algorithm>
 #include <cmath>
 
+#include <fmt/format.h>
+
+#include "core/error.h"
 #include "core/householder.h"
 #include "core/in_parallel.h"
 #include "fit/motion_prior.h"
@@ -49,9 +52,10 @@ MatrixXd beside(const MatrixXd& A, const MatrixXd& rows) {
 }  // namespace
 
 RunInLegs::Ties RunInLegs::ties() const {
-  const std::size_t first = 0;
-  const VectorXd g = steady_reading(model_->system(residual(first).conditions(), solutions_[first].theta, residual(first).channels()));
-  const Index channels = g.size(), levels = channels + 1, parameters = solutions_[first].theta.size();
+  constexpr double undetermined = 1e-11;
+  const LinearSystem system = model_->system(residual(0).conditions(), solutions_.front().theta, residual(0).channels());  // of all legs
+  const VectorXd g = steady_reading(system);
+  const Index channels = g.size(), levels = channels + 1, parameters = solutions_.front().theta.size();
   MatrixXd offset_from(channels, levels);  // o - g a
   offset_from << MatrixXd::Identity(channels, channels), -g;
   const bool with_slopes = !evaluations_.empty();
@@ -60,6 +64,12 @@ RunInLegs::Ties RunInLegs::ties() const {
   Index at = 0;
   for (std::size_t p = 0; p < size(); ++p) {
     const auto [value, factor] = residual(p).levels(solutions_[p]);
+    const VectorXd known = factor.diagonal().cwiseAbs();
+    if (!(known.minCoeff() > undetermined * known.maxCoeff())) {  // something that no reading tells: as if the leg had levels of its own
+      ties.rows.middleRows(at, p == 0 ? levels : channels).setZero();
+      at += p == 0 ? levels : channels;
+      continue;
+    }
     const MatrixXd slope = with_slopes ? MatrixXd(evaluations_[p].linear_slope.bottomRows(levels)) : MatrixXd(levels, 0);
     if (p == 0) {
       ties.rows.topRows(levels) << factor, factor * value;
@@ -68,9 +78,8 @@ RunInLegs::Ties RunInLegs::ties() const {
       at = levels;
       continue;
     }
-    const Index position = model_->system(residual(p).conditions(), solutions_[p].theta, residual(p).channels()).motion;
     VectorXd level = value;
-    level[channels] -= solutions_[p - 1].departure[position];
+    level[channels] -= solutions_[p - 1].departure[system.motion];
     const MatrixXd root = factor.triangularView<Eigen::Upper>().solve(MatrixXd::Identity(levels, levels));
     const MatrixXd spread = offset_from * root;
     const Eigen::LLT<MatrixXd> covariance(spread * spread.transpose());
@@ -81,7 +90,7 @@ RunInLegs::Ties RunInLegs::ties() const {
       MatrixXd moved = slope;
       const DualMatrix& arrival = evaluations_[p - 1].departure;
       for (Index j = 0; j < parameters; ++j)
-        if (arrival.depends_on(j)) moved(channels, j) -= arrival.d(j)(position, 0);
+        if (arrival.depends_on(j)) moved(channels, j) -= arrival.d(j)(system.motion, 0);
       ties.slope.middleRows(at, channels) = covariance.matrixL().solve(offset_from * moved);
     }
     at += channels;
@@ -131,6 +140,7 @@ const std::vector<RunResidual::Evaluation>& RunInLegs::by_leg(const RunResidual:
     evaluations_.clear();
   }
   if (solutions_.empty() || solutions_.front().theta != solution.theta) solve(solution.theta);
+  if (solutions_.size() != size()) throw NoAnswer(fmt::format("{}: the model of the fit runs away in this run; is it the fit of this rig, at this speed?", residual(0).run().file));
   if (!evaluations_.empty()) return evaluations_;
   for (std::size_t p = 0; p < size(); ++p) {
     if (p > 0) {

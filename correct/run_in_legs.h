@@ -22,14 +22,16 @@ namespace unrig {
 /// o_p - g (a_p - p_p) = o - g a within the errors of its left side, with p_p the shaft's position that the leg arrived in and g what a steady radian reads. A leg that arrived in a position that is a
 /// little off has made up for that by its offset: its reading of the level is good all the same.
 ///
-/// What else c_p leaves open of the state behind it is not handed on: what vibrations and lags keep of an error within the noise is far below it at the other end of a rest. One leg is the run as it is.
+/// What else c_p leaves open of the state behind it is not handed on, nor is it in the band of the next leg: what vibrations and lags keep of an error within the noise is far below it at the other end of
+/// a rest of some semichords. One leg is the run as it is.
 class RunInLegs {
  public:
-  /// Windows by legs, in samples of the run. More than one leg only for a linear model without measured inputs.
+  /// Windows by legs, in samples of the run. More than one leg only for a linear model without measured inputs and signals, whose states would begin anew in each (correct.cpp sees to that).
   RunInLegs(const AeroelasticModel& model, const Run& run, const std::vector<Windows>& legs);
 
   /// The sum over all legs: `linear` and `model` are those of a single leg, empty for several. chi-square infinite where one has no answer.
   RunResidual::Solution solve(const Eigen::VectorXd& theta);
+  /// Throws NoAnswer where several legs have no answer at that theta.
   RunResidual::Evaluation differentiate(const RunResidual::Solution& solution);
   /// The legs' own, at the theta of `solution`.
   const std::vector<RunResidual::Evaluation>& by_leg(const RunResidual::Solution& solution);

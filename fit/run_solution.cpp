@@ -218,7 +218,7 @@ void RunResidual::stack_rows(Linearised& lin) const {
   std::vector<MatrixXd> rows;
   double unreachable = 0;
   MatrixXd start = MatrixXd::Zero(lin.system.states(), unknowns_ + arrival_.cols());
-  start.rightCols(arrival_.cols()) = arrival_.value;
+  if (arrival_.cols() > 0) start.rightCols(1) = arrival_.value;
   for (std::size_t i = 0; i < free_.size(); ++i) start(free_[i], first_state_ + static_cast<Index>(i)) = 1;
   for (const MotionBasis::Phase& phase : phases_) {
     const Interval s = counted(phase);

@@ -55,7 +55,7 @@ if(NOT UNRIG_SANITIZE STREQUAL "ALL")  # ten seconds and more each, half an hour
   list(APPEND left_out Diagnose.* DecaysFirst.* DiagnosedRecordings.* Selection.* Effects.GaugeLowpassIsRecovered
     Trial.NothingHiddenAndAWave Trial.WhatIsHiddenOutsideTheCandidatesCannotBeNamed OpenQuestion.AFitOfOneModeBendsItsParametersToIt
     In/DryFriction.IsTakenOutOfTheLoad/* Given/KnownAmplifier.IsUndone/* LawSteps.OfAFitRefineTheLoadAsTheirSquareAndWithinItsBand
-    RunInLegs.* Restless.AnErrorOfTheRigMovesTheLoadAsItsColumnSays Restless.LoadIsFoundInTimeThatGoesWithTheRecord
+    RunInLegs.TakeRestsForWhatTheyAre RunInLegs.ACalibrationErrorScalesTheLoad RunInLegs.AreForLinearRigs RunInLegs.FollowStepsThatTheKnotsCannotFollow Restless.AnErrorOfTheRigMovesTheLoadAsItsColumnSays Restless.LoadIsFoundInTimeThatGoesWithTheRecord
     Restless.APlaceThatIsRougherThanTheRestIsNamed Report.ADiagnosisShowsItsRecordingsAndBothModels ReportInABrowser.LoadsDrawsAndZooms)
 endif()
 list(JOIN left_out ":" left_out)

@@ -298,6 +298,18 @@ TEST(Moving, TakesNoWanderingForMotion) {
   }
 }
 
+TEST(Moving, TakesNoSingleCodeOfAConverterForMotion) {
+  constexpr double code = 0.05;
+  VectorXd angle = VectorXd::Constant(4 * length, 40 * code);
+  for (const Index k : {3000, 3900, 9000}) angle.tail(angle.size() - k).array() += k == 3900 ? -code : code;
+  for (const Index k : {100, 5000, 7000, 7003}) angle[k] += code;
+  angle.segment(6000, 40).array() += 20 * code;
+  const std::vector<Interval> found = moving(angle, code / std::sqrt(12.0));
+  ASSERT_EQ(found.size(), 2u) << "up and down by twenty codes";
+  EXPECT_NEAR(static_cast<double>(found[0].first), 6000, 10);
+  EXPECT_NEAR(static_cast<double>(found[1].last), 6040, 10);
+}
+
 TEST(Moving, JoinsWhatNearlyTouches) {
   VectorXd angle = white_noise(length, 0.01, 41);
   add_ramp(angle, 1000, 8, 1);

@@ -60,13 +60,13 @@ Searched searched(RunInLegs& legs) {
 
 TEST(Knots, LegsAreCutWhereTheShaftRestsForLong) {
   const Windows windows{{{100, 190}, 2}, {{300, 370}, 2}, {{400, 500}, 2}, {{560, 640}, 2}, {{2000, 2900}, 2}};
-  const std::vector<Windows> legs = legs_of(windows);
+  const std::vector<Windows> legs = legs_of(windows, 100);
   ASSERT_EQ(legs.size(), 3u);
   EXPECT_EQ(legs[0].size(), 1u) << "with the next it would have as many knots as a leg may, or more, and the rest between is long enough";
   EXPECT_EQ(legs[1].size(), 3u) << "no rest of 100 samples between these";
   EXPECT_EQ(legs[1].front().stride, 1);
   EXPECT_EQ(legs[2].front().stride, 3) << "400 knots in 900 samples";
-  EXPECT_TRUE(legs_of({{{100, 180}, 9}, {{2000, 3300}, 9}}).empty()) << "1300 samples in motion are more than 400 knots can follow";
+  EXPECT_TRUE(legs_of({{{100, 180}, 9}, {{2000, 3300}, 9}}, 100).empty()) << "1300 samples in motion are more than 400 knots can follow";
 }
 
 TEST(RunInLegs, SlopesOfChiSquareAreItsDifferences) {
