@@ -304,22 +304,16 @@ std::string knots_too_far_apart(const Run& run, const Windows& windows) {
                      run.file, most_knots(windows.size()), stride, 1e3 * static_cast<double>(stride) * run.dt, most_moving(windows));
 }
 
-/// Whether every fitted channel has readings in every leg.
-bool all_read(const Run& run, std::vector<std::string> channels, const std::vector<Windows>& legs) {
-  constexpr Index enough = 50;  // samples before its first motion, and behind its last
-  channels.emplace_back("alpha");
+/// Whether every fitted channel has half of its readings there.
+bool is_read(const Run& run, const std::vector<std::string>& channels, const Interval& samples) {
   const Channel* weight = run.find("weight");
-  const auto reads = [&](const VectorXd& value, Index first, Index last) {
+  const auto reads = [&](const std::string& channel) {
+    const VectorXd& value = run.channel(channel).value;
     Index count = 0;
-    for (Index k = std::max<Index>(0, first); k < std::min(run.samples(), last); ++k) count += std::isfinite(value[k]) && (!weight || weight->value[k] > 0) ? 1 : 0;
-    return count >= enough / 2;
+    for (Index k = std::max<Index>(0, samples.first); k < std::min(run.samples(), samples.last); ++k) count += std::isfinite(value[k]) && (!weight || weight->value[k] > 0) ? 1 : 0;
+    return 2 * count >= samples.length();
   };
-  for (const std::string& name : channels) {
-    const VectorXd& value = run.channel(name).value;
-    for (const Windows& leg : legs)
-      if (!reads(value, leg.front().knots.first - enough, leg.front().knots.first) || !reads(value, leg.back().knots.last, leg.back().knots.last + enough)) return false;
-  }
-  return true;
+  return reads("alpha") && std::all_of(channels.begin(), channels.end(), reads);
 }
 
 /// The legs in which the run is followed; none where it is followed from sample to sample. Both are for linear rigs: a nonlinear force has to do with the knots there are, and is told so.
@@ -332,8 +326,8 @@ std::vector<Windows> legs_to_follow(const AeroelasticModel& model, const Run& ru
     constexpr Index fewest = 100;          // samples of a rest: a quarter of them before the next motion, for its level
     constexpr double shortest_rest = 4;  // semichords
     const Index rest = std::max(fewest, static_cast<Index>(shortest_rest * model.rig().semichord() / run.speed / run.dt));
-    const std::vector<Windows> legs = legs_of(windows, rest);
-    return system.exogenous.empty() && run_inputs(run, conditions).cols() == 0 && all_read(run, channels, legs) ? legs : std::vector<Windows>{};
+    const bool can_be_cut = system.exogenous.empty() && run_inputs(run, conditions).cols() == 0;
+    return can_be_cut ? legs_of(windows, rest, [&](const Interval& samples) { return is_read(run, channels, samples); }) : std::vector<Windows>{};
   }
   const Index most_at_all = farthest_at_all * most_knots(windows.size());
   if (windows.front().stride > farthest_at_all && hardly_rests(run, windows))

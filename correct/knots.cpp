@@ -24,13 +24,16 @@ bool too_far_apart(const Windows& windows) { return windows.front().stride > far
 
 Index most_moving(const Windows& windows) { return farthest_knots(windows) * most_knots(windows.size()); }
 
-std::vector<Windows> legs_of(const Windows& windows, Index shortest_rest) {
-  constexpr Index knots_in_leg = 150;
+std::vector<Windows> legs_of(const Windows& windows, Index shortest_rest, const std::function<bool(const Interval& samples)>& read) {
+  constexpr Index knots_in_leg = 150, level = 50;
   std::vector<Windows> legs;
   Index knots = 0;
   for (const MotionBasis::Window& w : windows) {
-    const bool rested = !legs.empty() && w.knots.first - legs.back().back().knots.last >= shortest_rest;
-    if (legs.empty() || (rested && knots + w.knots.length() > knots_in_leg)) {
+    const auto rested = [&] {
+      const Index last = legs.back().back().knots.last;
+      return w.knots.first - last >= shortest_rest && read({last, last + level}) && read({w.knots.first - level, w.knots.first});
+    };
+    if (legs.empty() || (knots + w.knots.length() > knots_in_leg && rested())) {
       legs.emplace_back();
       knots = 0;
     }

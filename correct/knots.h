@@ -1,5 +1,6 @@
 #pragma once
 #include <Eigen/Core>
+#include <functional>
 #include <vector>
 
 #include "core/motion.h"
@@ -20,8 +21,8 @@ bool too_far_apart(const Windows& windows);
 /// Samples in motion that so many windows can follow.
 Eigen::Index most_moving(const Windows& windows);
 
-/// The same windows by legs of a run (correct/run_in_legs.h): of some hundred knots, or of the motions between which the shaft does not rest for `shortest_rest` samples. Empty where a leg has more motion
-/// than its knots can follow.
-std::vector<Windows> legs_of(const Windows& windows, Eigen::Index shortest_rest);
+/// The same windows by legs of a run (correct/run_in_legs.h): of some hundred knots, or of the motions between which the shaft does not rest for `shortest_rest` samples, or where
+/// the fifty samples before the next one, or behind the last, are not `read`. Empty where a leg has more motion than its knots can follow.
+std::vector<Windows> legs_of(const Windows& windows, Eigen::Index shortest_rest, const std::function<bool(const Interval& samples)>& read);
 
 }  // namespace unrig

@@ -7,6 +7,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "correct/knots.h"
 #include "tests/correct/recorded_run.h"
@@ -60,13 +61,14 @@ Searched searched(RunInLegs& legs) {
 
 TEST(Knots, LegsAreCutWhereTheShaftRestsForLong) {
   const Windows windows{{{100, 190}, 2}, {{300, 370}, 2}, {{400, 500}, 2}, {{560, 640}, 2}, {{2000, 2900}, 2}};
-  const std::vector<Windows> legs = legs_of(windows, 100);
+  const auto always = [](const Interval&) { return true; };
+  const std::vector<Windows> legs = legs_of(windows, 100, always);
   ASSERT_EQ(legs.size(), 3u);
   EXPECT_EQ(legs[0].size(), 1u) << "with the next it would have as many knots as a leg may, or more, and the rest between is long enough";
   EXPECT_EQ(legs[1].size(), 3u) << "no rest of 100 samples between these";
   EXPECT_EQ(legs[1].front().stride, 1);
   EXPECT_EQ(legs[2].front().stride, 3) << "400 knots in 900 samples";
-  EXPECT_TRUE(legs_of({{{100, 180}, 9}, {{2000, 3300}, 9}}, 100).empty()) << "1300 samples in motion are more than 400 knots can follow";
+  EXPECT_TRUE(legs_of({{{100, 180}, 9}, {{2000, 3300}, 9}}, 100, always).empty()) << "1300 samples in motion are more than 400 knots can follow";
 }
 
 TEST(RunInLegs, SlopesOfChiSquareAreItsDifferences) {
@@ -168,6 +170,26 @@ TEST(RunInLegs, ACalibrationErrorScalesTheLoad) {
   // To first order in the error, and as far as noise and regularisation are not chosen anew.
   EXPECT_LT(rms(moved.cwiseAbs() - predicted), 0.06 * rms(predicted));
   EXPECT_GT(rms(predicted), 0.005 * rms(result.circulatory.value));
+}
+
+TEST(Knots, LegsAreNotCutWhereNothingIsRead) {
+  const Windows windows{{{100, 250}, 2}, {{500, 650}, 2}, {{900, 1050}, 2}};
+  const auto legs_without = [&](Eigen::Index first, Eigen::Index last) { return legs_of(windows, 100, [&](const Interval& i) { return i.last <= first || i.first >= last; }); };
+  EXPECT_EQ(legs_without(0, 0).size(), 3u);
+  EXPECT_EQ(legs_without(500, 640).size(), 3u) << "missing while the shaft moves";
+  EXPECT_EQ(legs_without(640, 670).size(), 2u) << "no level behind the second motion";
+  EXPECT_EQ(legs_without(480, 670).size(), 1u) << "none on either side of it";
+}
+
+/// A motion that the gauge misses has no offset of its own to be found.
+TEST(RunInLegs, NeedReadingsInEachOfThem) {
+  Recorded r = record(&ten_steps, 10000);
+  test::channel_of(r.run, "gauge").segment(4300, 950).setConstant(std::nan(""));
+  const CorrectResult result = correct({test::null_rig(), test::null_fit(), r.run, 0});
+  EXPECT_NEAR(result.slope, slope, 3 * result.slope_std);
+  EXPECT_LT(result.slope_std, 0.02 * slope);
+  for (const auto& [load, truth] : {std::pair{&result.circulatory, &r.circulatory}, std::pair{&result.normal_force, &r.normal_force}})
+    EXPECT_LT((load->value - *truth).cwiseQuotient(load->std).cwiseAbs().maxCoeff(), load->simultaneous + 1) << "where it is missing too";
 }
 
 TEST(RunInLegs, AreForLinearRigs) {
