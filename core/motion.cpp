@@ -11,6 +11,8 @@ namespace {
 using Eigen::Index;
 using Eigen::VectorXd;
 
+constexpr double median_to_sigma = 1.482602218505602;  // 1 / Phi^-1(3/4), of absolute deviations
+
 /// Coefficients of a cubic B-spline stretched by `stride` in splines on the fine knots: four boxes of that width, convolved.
 VectorXd two_scale(Index stride) {
   VectorXd mask = VectorXd::Ones(1);
@@ -190,7 +192,6 @@ double noise_level(const VectorXd& channel, int order) {
     for (int i = 0; i <= order; ++i) difference += binomial[static_cast<std::size_t>(i)] * channel[k + i];
     if (std::isfinite(difference)) differences.push_back(std::abs(difference));
   }
-  constexpr double median_to_sigma = 1.482602218505602;  // 1 / Phi^-1(3/4)
   const double robust = median_to_sigma * median(differences);
   // The median alone wastes two thirds of the data: mean square of all that lies within 3.5 of it, over that of a normal cut off there.
   constexpr double cut = 3.5, cut_variance = 0.99389;
@@ -264,8 +265,8 @@ void widen(std::vector<Interval>& intervals, const VectorXd& smooth, Index reach
 std::vector<Interval> moving_slowly(const VectorXd& angle, double sigma, double quantum, Index m, const std::vector<Interval>& known) {
   constexpr Index beside = 500;  // samples: how a motion begins and ends softly is for others to see
   constexpr std::size_t enough = 40;
-  constexpr double chance = 8, normal = 1.4826;  // standard deviations; of a normal distribution in its median absolute deviation
-  constexpr double one_code = 1.5;               // quanta: a quiet converter that changes by one is no motion
+  constexpr double chance = 8;      // standard deviations
+  constexpr double one_code = 1.5;  // quanta: a quiet converter that changes by one is no motion
   const Index n = angle.size();
   VectorXd sum = VectorXd::Zero(n + 1);
   for (Index k = 0; k < n; ++k) sum[k + 1] = sum[k] + angle[k];
@@ -279,7 +280,7 @@ std::vector<Interval> moving_slowly(const VectorXd& angle, double sigma, double 
   }
   if (change.size() < enough) return {};
   std::vector<double> sorted = change;
-  const double least = std::max(chance * std::max(sigma * std::sqrt(2 / static_cast<double>(m)), normal * median(sorted)), one_code * quantum);
+  const double least = std::max(chance * std::max(sigma * std::sqrt(2 / static_cast<double>(m)), median_to_sigma * median(sorted)), one_code * quantum);
   std::vector<Interval> intervals;
   for (std::size_t i = 0; i < at.size(); ++i) {
     if (!(change[i] > least)) continue;

@@ -79,8 +79,8 @@ double rounding_level(const Eigen::VectorXd& channel);
 /// fast for its samples is no spike. Returns true where a sample should be left out.
 std::vector<bool> isolated_spikes(const Eigen::VectorXd& channel, double sigma, const std::vector<Interval>& motion, double limit = 6);
 
-/// Where the shaft moves: samples whose median-filtered angle changes by more than the noise allows within six, merged where they nearly touch, and widened where they hardly stand out of it; and, far from these, where its means over 16, 64 or 256
-/// samples change by more than noise and wandering do elsewhere.
+/// Where the shaft moves: samples whose median-filtered angle changes by more than the noise allows within six, merged where they nearly touch, and widened where they hardly stand out
+/// of it; and, far from these, where its means over 16, 64 or 256 samples change by more than noise and wandering do elsewhere.
 std::vector<Interval> moving(const Eigen::VectorXd& angle, double sigma);
 
 }  // namespace unrig

@@ -41,7 +41,13 @@ LinearSystem lag_system(const VectorXd& rate, double U, double b, const RowVecto
 class Lags {
  public:
   Lags(const LinearSystem& system, const ExactStep& step, const MotionBasis& motion, const VectorXd& unknowns, const RigidLoad::State& from)
-      : system_(system), step_(step), motion_(motion), moves_(motion_of(motion.coefficients(unknowns), step.dt)), phases_(motion.phases()), from_(from.value.size() > 0 ? from.value : VectorXd::Zero(system.states())), from_by_theta_(from.by_theta.size() > 0 ? from.by_theta : MatrixXd(system.states(), 0)) {
+      : system_(system),
+        step_(step),
+        motion_(motion),
+        moves_(motion_of(motion.coefficients(unknowns), step.dt)),
+        phases_(motion.phases()),
+        from_(from.value.size() > 0 ? from.value : VectorXd::Zero(system.states())),
+        from_by_theta_(from.by_theta.size() > 0 ? from.by_theta : MatrixXd(system.states(), 0)) {
     moves_.angle.array() += from_[system.motion];
     Index longest = 0;
     for (const MotionBasis::Phase& phase : phases_)

@@ -74,10 +74,6 @@ AeroelasticModel free_model(const CorrectProblem& problem, double semichords) {
   return model;
 }
 
-Searched searched(RunInLegs& legs) {
-  return {[&legs](const VectorXd& theta) { return legs.solve(theta); }, [&legs](const RunResidual::Solution& solution) { return legs.differentiate(solution); }};
-}
-
 /// The best theta with noise levels, roughness of the motion and weight of the regularisation learned on the way.
 Search estimate(RunInLegs& legs, const Prior& prior, const VectorXd& start) {
   constexpr double roughly = 1, well = 1e-3;  // of a chi-square whose own scatter is some tens

@@ -250,4 +250,8 @@ UncertaintyBudget RunInLegs::budget(std::size_t leg, const Together& together, c
   return {residual(leg), e, prior, legs_[leg].motion_prior, others, calibration_uncertainty, inflation};
 }
 
+Searched searched(RunInLegs& legs) {
+  return {[&legs](const VectorXd& theta) { return legs.solve(theta); }, [&legs](const RunResidual::Solution& solution) { return legs.differentiate(solution); }};
+}
+
 }  // namespace unrig

@@ -7,6 +7,7 @@
 #include "core/aeroelastic_model.h"
 #include "core/run.h"
 #include "correct/knots.h"
+#include "correct/prior.h"
 #include "correct/uncertainty_budget.h"
 #include "fit/run_residual.h"
 
@@ -75,5 +76,8 @@ class RunInLegs {
   std::vector<RunResidual::Solution> solutions_;
   std::vector<RunResidual::Evaluation> evaluations_;  ///< at the theta of the solutions; empty where they were not asked for
 };
+
+/// What a search (correct/prior.h) asks of it.
+Searched searched(RunInLegs& legs);
 
 }  // namespace unrig

@@ -55,6 +55,25 @@ inline Eigen::VectorXd& channel_of(Run& run, const std::string& name) {
 
 inline double rms(const Eigen::VectorXd& x) { return x.norm() / std::sqrt(static_cast<double>(x.size())); }
 
+/// The null campaign's rig with a build-up of circulation that is free.
+inline AeroelasticModel free_circulation() {
+  const Eigen::VectorXd rates{{0.003, 0.03, 0.1, 0.3, 1.2}};
+  return {null_rig(), make_basis(null_rig(), null_fit().normal_modes, null_fit().torsion_modes), {"free", Eigen::VectorXd{{0.02, 0.1, 0.15, 0.2, 0.03}}, rates}, AeroelasticModel::Circulation::free};
+}
+
+/// The null campaign's fit as if it had found dry friction too.
+inline FittedRig with_friction() {
+  FittedRig fit = null_fit();
+  fit.effects = {"coulomb-friction"};
+  for (const char* name : {"coulomb-friction.force", "coulomb-friction.velocity"}) {
+    fit.parameters.emplace_back();
+    fit.parameters.back().name = name;
+    fit.parameters.back().value = 0.1;
+  }
+  fit.correlation = Eigen::MatrixXd::Identity(static_cast<Eigen::Index>(fit.parameters.size()), static_cast<Eigen::Index>(fit.parameters.size()));
+  return fit;
+}
+
 /// 0 to 1 for x from 0 to 1.
 inline double soft(double x) { return x <= 0 ? 0 : x >= 1 ? 1 : x * x * x * (10 - 15 * x + 6 * x * x); }
 

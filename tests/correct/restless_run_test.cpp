@@ -22,6 +22,7 @@ using std::numbers::pi;
 using ::testing::HasSubstr;
 using ::testing::Contains;
 using test::channel_of;
+using test::free_circulation;
 using test::record;
 using test::Recorded;
 using test::rms;
@@ -41,11 +42,6 @@ double chirp(double t) {
   constexpr double first = 0.2, last = 5, duration = 180;
   const double growth = std::log(last / first);
   return 2 * soft((t - 0.2) / 0.3) * std::sin(2 * pi * first * duration / growth * std::expm1((t - 0.2) / duration * growth));
-}
-
-AeroelasticModel free_circulation() {
-  const VectorXd rates{{0.003, 0.03, 0.1, 0.3, 1.2}};
-  return {test::null_rig(), make_basis(test::null_rig(), test::null_fit().normal_modes, test::null_fit().torsion_modes), {"free", VectorXd{{0.02, 0.1, 0.15, 0.2, 0.03}}, rates}, AeroelasticModel::Circulation::free};
 }
 
 TEST(RestlessRun, SlopesOfChiSquareAreItsDifferences) {
@@ -101,18 +97,6 @@ TEST(RestlessRun, PiecesMakeTheWholeRecord) {
   EXPECT_LT((ratio * ratio.transpose() - Eigen::MatrixXd::Identity(theta.size(), theta.size())).cwiseAbs().maxCoeff(), 1e-3);
 }
 
-FittedRig with_friction() {
-  FittedRig fit = test::null_fit();
-  fit.effects = {"coulomb-friction"};
-  for (const char* name : {"coulomb-friction.force", "coulomb-friction.velocity"}) {
-    fit.parameters.emplace_back();
-    fit.parameters.back().name = name;
-    fit.parameters.back().value = 0.1;
-  }
-  fit.correlation = Eigen::MatrixXd::Identity(static_cast<Index>(fit.parameters.size()), static_cast<Index>(fit.parameters.size()));
-  return fit;
-}
-
 /// The settled filter is for linear rigs, and 400 knots do not follow such a motion: it must say so, and what to do.
 // Where the section moves with negative damping no record like this one exists; the responses that slopes are made of would overflow over a long one.
 TEST(RestlessRun, ARigThatWouldFlutterIsNoCandidate) {
@@ -128,7 +112,7 @@ TEST(RestlessRun, ARigThatWouldFlutterIsNoCandidate) {
 TEST(Restless, ANonlinearForceIsRefusedWithAdvice) {
   const Recorded r = record(&sine, 10000);
   try {
-    correct({test::null_rig(), with_friction(), r.run, 0});
+    correct({test::null_rig(), test::with_friction(), r.run, 0});
     FAIL() << "corrected";
   } catch (const NoAnswer& refusal) {
     EXPECT_THAT(refusal.what(), HasSubstr("nonlinear force"));

@@ -9,6 +9,7 @@
 #include <cmath>
 #include <utility>
 
+#include "core/error.h"
 #include "correct/knots.h"
 #include "tests/correct/recorded_run.h"
 
@@ -19,6 +20,7 @@ using Eigen::Index;
 using Eigen::VectorXd;
 using ::testing::Contains;
 using ::testing::HasSubstr;
+using test::free_circulation;
 using test::record;
 using test::Recorded;
 using test::rms;
@@ -44,19 +46,10 @@ double stair(double t) {
   return angle;
 }
 
-AeroelasticModel free_circulation() {
-  const VectorXd rates{{0.003, 0.03, 0.1, 0.3, 1.2}};
-  return {test::null_rig(), make_basis(test::null_rig(), test::null_fit().normal_modes, test::null_fit().torsion_modes), {"free", VectorXd{{0.02, 0.1, 0.15, 0.2, 0.03}}, rates}, AeroelasticModel::Circulation::free};
-}
-
 std::vector<Windows> single_motions(const Windows& windows) {
   std::vector<Windows> legs;
   for (const MotionBasis::Window& w : windows) legs.push_back({w});
   return legs;
-}
-
-Searched searched(RunInLegs& legs) {
-  return {[&legs](const VectorXd& theta) { return legs.solve(theta); }, [&legs](const RunResidual::Solution& solution) { return legs.differentiate(solution); }};
 }
 
 TEST(Knots, LegsAreCutWhereTheShaftRestsForLong) {
@@ -78,7 +71,7 @@ TEST(RunInLegs, SlopesOfChiSquareAreItsDifferences) {
   ASSERT_EQ(legs.size(), 4u);
   const VectorXd start = theta_for(model, test::null_fit(), "");
   const Search best = minimise(searched(legs), prior_of(model, test::null_fit(), start, r.run.file), start, 1, false);
-  // A little beside the best, where the slopes are steep and what is left is noise: how the knots of a leg follow theta, which moves the next, is known as far as Kaufman's rule goes.
+  // A little beside the best, where the slopes are steep and what is left is noise: how the knots of a leg follow theta, which moves the next, is known as far as Kaufman's rule goes: 1.3e-3 measured.
   const VectorXd theta = best.solution.theta + 0.03 * best.solution.theta.cwiseAbs();
   const RunResidual::Evaluation e = legs.differentiate(legs.solve(theta));
   EXPECT_NEAR(e.residual.squaredNorm(), legs.solve(theta).chi2, 1e-8 * e.chi2);
@@ -91,6 +84,17 @@ TEST(RunInLegs, SlopesOfChiSquareAreItsDifferences) {
     const double difference = (legs.solve(up).chi2 - legs.solve(down).chi2) / (2 * h);
     EXPECT_NEAR(gradient[j], difference, 2e-3 * e.jacobian.col(j).norm() * std::sqrt(e.chi2)) << name << " off by " << (gradient[j] - difference) / e.jacobian.col(j).norm() / std::sqrt(e.chi2);
   }
+}
+
+TEST(RunInLegs, AModelThatRunsAwayIsNoAnswer) {
+  const Recorded r = record(&four_steps, 5000);
+  const AeroelasticModel model = free_circulation();
+  RunInLegs legs(model, r.run, single_motions(generous_windows(r.run)));
+  VectorXd theta = theta_for(model, test::null_fit(), "");
+  theta[model.index("torsion.damping_ratio")] = -0.9;
+  const RunResidual::Solution solution = legs.solve(theta);
+  EXPECT_TRUE(std::isinf(solution.chi2)) << solution.chi2;
+  EXPECT_THROW(legs.differentiate(solution), NoAnswer);
 }
 
 /// What the cuts cost: four legs against all knots together, which four steps still allow.
@@ -112,9 +116,9 @@ TEST(RunInLegs, SayWhatTheRunInOnePieceSays) {
   }
   for (const std::string name : {"normal_force_slope", "circulation.amplitude[2]", "circulation.amplitude[4]", "torsion.stiffness_scale"}) {
     const Index j = model.index(name);
-    // Offsets and levels of their own, and other noise levels: some of what is known is lost at the cuts. 0.5 of a standard deviation and 11 % measured.
-    EXPECT_NEAR(found[1][j], found[0][j], uncertain[0][j]) << name;
-    EXPECT_NEAR(uncertain[1][j] / uncertain[0][j], 1, 0.3) << name;
+    // The cuts lose little: 0.07 of a standard deviation and 3 % measured. Without what ties their offsets an amplitude was 1.9 off, and 1.9 times as wide.
+    EXPECT_NEAR(found[1][j], found[0][j], 0.3 * uncertain[0][j]) << name;
+    EXPECT_NEAR(uncertain[1][j] / uncertain[0][j], 1, 0.1) << name;
   }
 }
 
@@ -126,8 +130,8 @@ TEST(RunInLegs, FollowStepsThatTheKnotsCannotFollow) {
     const CorrectedLoad& load = circulatory ? result.circulatory : result.normal_force;
     const VectorXd& truth = circulatory ? r.circulatory : r.normal_force;
     const VectorXd off = load.value - truth, in_deviations = off.cwiseQuotient(load.std);
-    // 0.0004 and 0.002 of the range measured, and 0.0017 and 0.006 with one roughness for motion and rests.
-    EXPECT_LT(rms(off), (circulatory ? 0.0008 : 0.004) * (truth.maxCoeff() - truth.minCoeff()));
+    // 0.0006 and 0.0039 of the range measured; 0.0017 and 0.006 with one roughness for motion and rests.
+    EXPECT_LT(rms(off), (circulatory ? 0.0009 : 0.005) * (truth.maxCoeff() - truth.minCoeff()));
     EXPECT_LT(in_deviations.cwiseAbs().maxCoeff(), load.simultaneous + 1);
     EXPECT_LT((load.by_source.rowwise().norm() - load.std).cwiseQuotient(load.std).maxCoeff(), 1e-3) << "both interpolated";
   }
@@ -136,7 +140,7 @@ TEST(RunInLegs, FollowStepsThatTheKnotsCannotFollow) {
   EXPECT_TRUE(result.warnings.empty()) << result.warnings.front();
 }
 
-/// From sample to sample, with one roughness for motion and rests, the start of the response was 61 standard deviations off in such a record, and the load 13.
+/// From sample to sample, with one roughness for motion and rests, the start of the response came out tens of standard deviations off where the rests are long (tests/studies/CORRECT.md).
 TEST(RunInLegs, TakeRestsForWhatTheyAre) {
   const Recorded r = record(&stair, 62000);
   const CorrectResult result = correct({test::null_rig(), test::null_fit(), r.run, 0});
@@ -158,7 +162,7 @@ TEST(RunInLegs, TakeRestsForWhatTheyAre) {
   }
   EXPECT_LT(farthest, result.indicial.uncertainty.simultaneous + 1);
   EXPECT_NEAR(result.slope, slope, 3 * result.slope_std);
-  EXPECT_LT(result.slope_std, 0.01 * slope);
+  EXPECT_LT(result.slope_std, 0.01 * slope) << "0.001 measured: it is determined";
 }
 
 TEST(RunInLegs, ACalibrationErrorScalesTheLoad) {
@@ -167,7 +171,7 @@ TEST(RunInLegs, ACalibrationErrorScalesTheLoad) {
   const CorrectResult result = correct(problem);
   test::channel_of(problem.run, "gauge") *= 1.01;
   const VectorXd moved = correct(problem).circulatory.value - result.circulatory.value, predicted = result.circulatory.by_source.col(static_cast<Index>(Source::calibration));
-  // To first order in the error, and as far as noise and regularisation are not chosen anew.
+  // To first order in the error, and as far as noise and regularisation are not chosen anew: 2 % measured.
   EXPECT_LT(rms(moved.cwiseAbs() - predicted), 0.06 * rms(predicted));
   EXPECT_GT(rms(predicted), 0.005 * rms(result.circulatory.value));
 }
@@ -194,15 +198,7 @@ TEST(RunInLegs, NeedReadingsInEachOfThem) {
 
 TEST(RunInLegs, AreForLinearRigs) {
   const Recorded r = record(&ten_steps, 10000);
-  FittedRig fit = test::null_fit();
-  fit.effects = {"coulomb-friction"};
-  for (const char* name : {"coulomb-friction.force", "coulomb-friction.velocity"}) {
-    fit.parameters.emplace_back();
-    fit.parameters.back().name = name;
-    fit.parameters.back().value = 0.1;
-  }
-  fit.correlation = Eigen::MatrixXd::Identity(static_cast<Index>(fit.parameters.size()), static_cast<Index>(fit.parameters.size()));
-  EXPECT_THAT(correct({test::null_rig(), fit, r.run, 0}).warnings, Contains(HasSubstr("600 knots of its motion lie 2 samples apart")));
+  EXPECT_THAT(correct({test::null_rig(), test::with_friction(), r.run, 0}).warnings, Contains(HasSubstr("600 knots of its motion lie 2 samples apart")));
 }
 
 }  // namespace
