@@ -73,6 +73,17 @@ Index enough_to_begin_with(const Run& run, std::vector<std::string> channels) {
   return 2 * samples < run.samples() ? samples : run.samples();
 }
 
+/// minimise(), with missing readings as they are best at what it finds: searched again as long as that changes them.
+Search minimise_with_gaps(RestlessRun& run, const AeroelasticModel& model, const Prior& prior, VectorXd theta, double well, bool learn) {
+  constexpr int most = 10;
+  constexpr double same = 0.1;  // of chi-square: a third of a standard deviation at most
+  for (int round = 1;; ++round) {
+    Search search = minimise(searched(run, model, prior), prior, theta, well, learn);
+    theta = search.solution.theta;
+    if (round == most || run.settle_missing(theta) < same) return search;
+  }
+}
+
 /// The best theta with noise levels, roughness of the motion and weight of the regularisation learned on the way: of a long record first on its beginning, so that all of it is gone
 /// through a few times only.
 Search estimate(RestlessRun& run, const AeroelasticModel& model, const RestlessProblem& problem) {
@@ -84,6 +95,7 @@ Search estimate(RestlessRun& run, const AeroelasticModel& model, const RestlessP
   std::optional<RestlessRun> beginning;
   if (in_parts) beginning.emplace(model, first);
   RestlessRun& part = in_parts ? *beginning : run;
+  part.settle_missing(theta);
   theta = minimise(searched(part, model, prior), prior, theta, roughly, false).solution.theta;
   part.settle_noise(theta);
   part.settle_roughness(theta, RestlessRun::Look::everywhere);
@@ -99,7 +111,8 @@ Search estimate(RestlessRun& run, const AeroelasticModel& model, const RestlessP
   }
   run.settle_noise(theta);
   run.settle_roughness(theta, RestlessRun::Look::near);
-  return minimise(searched(run, model, prior), prior, theta, well, true);
+  run.settle_missing(theta);
+  return minimise_with_gaps(run, model, prior, theta, well, true);
 }
 
 /// How the readings and the loads move with z = (theta, linear unknowns), and what the smoother leaves of that.
@@ -219,8 +232,8 @@ VectorXd rougher_than_the_record(const VectorXd& jerk) {
   return rougher;
 }
 
-/// Standard deviations of a load, by sources.
-void set_bands(const RestlessRun& run, const RestlessRun::Point& point, Index load, const VectorXd& rougher, const Slopes& slopes, const UncertaintyBudget& budget, double calibration, double inflation,
+/// Standard deviations of a load, by sources. `in_gaps`: what missing readings add to the motion's variance.
+void set_bands(const RestlessRun& run, const RestlessRun::Point& point, Index load, const VectorXd& rougher, const VectorXd& in_gaps, const Slopes& slopes, const UncertaintyBudget& budget, double calibration, double inflation,
                CorrectedLoad& result) {
   const RowVectorXd over_states = load_row(run, point, load);
   const Eigen::MatrixXf& D = slopes.load[static_cast<std::size_t>(load)];
@@ -234,7 +247,7 @@ void set_bands(const RestlessRun& run, const RestlessRun::Point& point, Index lo
   share[static_cast<std::size_t>(Source::regularisation)] = 1 - gauge - angle;
   const auto of_motion = [&](Index source, Index k) {
     const double by_size = share[static_cast<std::size_t>(source)] * std::max(0.0, variance[k]);
-    return static_cast<Source>(source) == Source::regularisation ? by_size * rougher[k] : by_size;
+    return static_cast<Source>(source) == Source::regularisation ? (by_size + in_gaps[k]) * rougher[k] : by_size;
   };
   const double alike = neighbours_alike(run, point, load);
 
@@ -277,9 +290,8 @@ void warn(const RestlessRun& run, const RestlessRun::Point& point, double reduce
     result.warnings.push_back(fmt::format("{}: the shaft moves as fast as it is sampled (its third derivative changes by {:.2g} of the angle's noise from sample to sample); what it does between samples is "
                                           "missing from the load. Sample faster.",
                                           result.file, run.roughness()));
-  constexpr Index unnoticed = 5;
-  if (run.longest_gap() > unnoticed)
-    result.warnings.push_back(fmt::format("{}: {} samples are missing from {:.4g} s on while the shaft moves; the band there is too narrow. Correct the parts before and behind by themselves.", result.file,
+  if (run.longest_gap() > RestlessRun::unnoticed)
+    result.warnings.push_back(fmt::format("{}: {} samples are missing from {:.4g} s on while the shaft moves; the load there is what the readings around them make likely, and its band as wide as that.", result.file,
                                           run.longest_gap(), run.longest_gap_at()));
   // Where the record is rougher than one tau for all of it allows, the innovations are larger: over a few knots, or over parts of the record.
   const Index n = run.samples();
@@ -360,7 +372,7 @@ void correct_restless(const RestlessProblem& problem, CorrectResult& result) {
   if (problem.imposed.any()) {
     constexpr double well = 1e-2;
     const Prior imposed = impose(free.prior, problem.imposed, model, response_semichords(problem.semichords));
-    best = minimise(searched(run, model, imposed), imposed, free.solution.theta, well, false);
+    best = minimise_with_gaps(run, model, imposed, free.solution.theta, well, false);
     best.determined = free.determined;
   }
   const VectorXd& theta = best.solution.theta;
@@ -377,7 +389,8 @@ void correct_restless(const RestlessProblem& problem, CorrectResult& result) {
     const RestlessRun::Point& point = run.at(search.solution.theta);
     looked.slopes = slopes_of(run, point, problem.steady_per_reading);
     result.reduced_chi2 = looked.e.chi2 / static_cast<double>(run.observations() - static_cast<Index>(search.prior.free.size()) - point.linear.size());
-    looked.inflation = std::sqrt(std::max(1.0, result.reduced_chi2));
+    const double read = static_cast<double>(run.observations()) / static_cast<double>((run.outputs() + 1) * run.samples());  // the slopes take missing samples for readings
+    looked.inflation = std::sqrt(std::max(1.0, result.reduced_chi2) / read);
     const auto shares = [&](const MatrixXd& F, const MatrixXd& priors) -> UncertaintyBudget::Shares {
       const MatrixXd angle = F.transpose() * looked.slopes.angle_information * F, gauge = F.transpose() * looked.slopes.gauge_information * F;
       return {angle, MatrixXd::Identity(F.cols(), F.cols()) - priors - gauge - angle};
@@ -395,8 +408,11 @@ void correct_restless(const RestlessProblem& problem, CorrectResult& result) {
 
   const VectorXd rougher = rougher_than_the_record(smoothed_run(run, point, problem.steady_per_reading, result));
   warn(run, point, result.reduced_chi2, result.start, result);
+  MatrixXd rows(loads, load_row(run, point, 0).size());
+  for (Index l = 0; l < loads; ++l) rows.row(l) = load_row(run, point, l);
+  const MatrixXd in_gaps = run.variance_in_gaps(point, rows);
   run.forget_readings();
-  for (Index l = 0; l < loads; ++l) set_bands(run, point, l, rougher, looked.slopes, *looked.budget, result.calibration_uncertainty, looked.inflation, l == 0 ? result.circulatory : result.normal_force);
+  for (Index l = 0; l < loads; ++l) set_bands(run, point, l, rougher, in_gaps.col(l), looked.slopes, *looked.budget, result.calibration_uncertainty, looked.inflation, l == 0 ? result.circulatory : result.normal_force);
   vary_weight(best, looked.e, looked.slopes, model, result);
 
   result.noise = run.sigma()[0];

@@ -280,10 +280,14 @@ void RestlessRun::slopes(const Point& point, const VectorXd& motion, const std::
   });
 }
 
+Index RestlessRun::stride_of_motion() const {
+  constexpr double radian = 1, most = 16;
+  return static_cast<Index>(std::clamp(radian / std::pow(roughness_, 0.25), 1.0, most));
+}
+
 RestlessRun::Looked RestlessRun::looked() const {
-  constexpr double radian = 1;
-  constexpr Index most = 16, end = 512;
-  const Index n = samples(), stride = n > in_one_piece_ ? std::clamp<Index>(static_cast<Index>(radian / std::pow(roughness_, 0.25)), 1, most) : 1;
+  constexpr Index end = 512;
+  const Index n = samples(), stride = n > in_one_piece_ ? stride_of_motion() : 1;
   Looked looked;
   for (Index k = 0; k < n; k += k < end || k >= n - end ? 1 : std::min(stride, n - end - k)) looked.at.push_back(k);
   const auto count = static_cast<Index>(looked.at.size());
@@ -329,23 +333,68 @@ RunResidual::Evaluation RestlessRun::differentiate(const RunResidual::Solution& 
   return e;
 }
 
-MatrixXd RestlessRun::left_by_smoother(const Point& point) const {
+/// What the smoother leaves of readings.
+struct RestlessRun::Reader {
+  explicit Reader(const Point& point) : smoother(*point.smoother) {
+    for (const RowVectorXd& row : smoother.filter().C.rowwise()) read.push_back(smoother.quantity(row));
+    for (const SettledSmoother::Quantity& q : read) each.push_back(&q);
+  }
+  MatrixXd left(const MatrixXd& readings, const MatrixXd& white) const { return readings - smoother.smoothed(each, readings, white); }
+
+  const SettledSmoother& smoother;
   std::vector<SettledSmoother::Quantity> read;
   std::vector<const SettledSmoother::Quantity*> each;
-  for (const RowVectorXd& row : point.smoother->filter().C.rowwise()) read.push_back(point.smoother->quantity(row));
-  for (const SettledSmoother::Quantity& q : read) each.push_back(&q);
-  return point.left - point.smoother->smoothed(each, point.left, point.white);
+};
+
+MatrixXd RestlessRun::left_by_smoother(const Point& point) const { return Reader(point).left(point.left, point.white); }
+
+double RestlessRun::settle_missing(const VectorXd& theta) {
+  constexpr int most = 300, in_a_row = 4;
+  constexpr double little = 1e-3;  // of chi-square
+  if (!missing_.any()) return 0;
+  const Point& point = at(theta);
+  const Reader reader(point);
+  const MatrixXd none = MatrixXd::Zero(samples(), outputs() + 1);
+  // Half the fall of chi-square with missing readings, in units of their noise.
+  const auto uphill = [&](const MatrixXd& left) -> MatrixXd { return missing_.select(left * sigma_.cwiseInverse().asDiagonal(), none); };
+  const auto left_of = [&](MatrixXd readings) {
+    MatrixXd white = point.smoother->innovations(readings);
+    const VectorXd linear = solve_above(point.linear_factor, solve_below(point.linear_factor, point.white_columns.transpose() * flat(white)));
+    for (Index j = 0; j < linear.size(); ++j) readings -= linear[j] * column(point, j);
+    Eigen::Map<VectorXd>(white.data(), white.size()) -= point.white_columns * linear;
+    return reader.left(readings, white);
+  };
+  MatrixXd left = -uphill(reader.left(point.left, point.white)), direction = left, change = none;
+  double fall = 0, squares = left.squaredNorm();
+  for (int step = 0, small = 0; step < most && small < in_a_row && squares > 0; ++step) {
+    const MatrixXd bent = uphill(left_of(direction * sigma_.asDiagonal()));
+    const double bend = direction.cwiseProduct(bent).sum();
+    if (!(bend > 0)) break;  // rounding
+    const double length = squares / bend, fallen = length * squares;
+    change += length * direction;
+    left -= length * bent;
+    fall += fallen;
+    small = fallen < little ? small + 1 : 0;
+    const double before = std::exchange(squares, left.squaredNorm());
+    direction = left + squares / before * direction;
+  }
+  measured_ += change * sigma_.asDiagonal();
+  last_.reset();
+  return fall;
 }
 
-void RestlessRun::settle_missing(const VectorXd& theta) {
-  constexpr int most = 12;
-  constexpr double settled = 0.1;  // of the noise
-  for (int round = 0; round < most && missing_.any(); ++round) {
-    const MatrixXd off = missing_.select(left_by_smoother(at(theta)), MatrixXd::Zero(samples(), outputs() + 1));
-    measured_ -= off;
-    last_.reset();
-    if ((off.cwiseAbs().colwise().maxCoeff().transpose().cwiseQuotient(sigma_)).maxCoeff() < settled) return;
-  }
+MatrixXd RestlessRun::variance_in_gaps(const Point& point, const MatrixXd& rows) const {
+  if (longest_gap_ <= unnoticed) return MatrixXd::Zero(samples(), rows.rows());
+  Missing long_ones = missing_;
+  for (Index c = 0; c < missing_.cols(); ++c)
+    for (Index k = 0; k < samples(); ++k) {
+      if (!missing_(k, c)) continue;
+      Index end = k;
+      while (end < samples() && missing_(end, c)) ++end;
+      if (end - k <= unnoticed) long_ones.col(c).segment(k, end - k).setConstant(false);
+      k = end;
+    }
+  return unrig::variance_in_gaps(point.smoother->filter(), long_ones, rows, stride_of_motion());
 }
 
 void RestlessRun::settle_noise(const VectorXd& theta) {
@@ -382,7 +431,7 @@ void RestlessRun::settle_roughness(const VectorXd& theta, Look look) {
     if (is_new) {
       roughness_ = std::pow(10, decade);
       const std::shared_ptr<Point> point = point_at(theta);
-      place->second = static_cast<double>(samples()) * point->log_determinant + point->chi2;
+      place->second = static_cast<double>(observations_) / static_cast<double>(outputs() + 1) * point->log_determinant + point->chi2;
     }
     return place->second;
   };

@@ -12,6 +12,7 @@
 #include "correct/loaded_system.h"
 #include "correct/prior.h"
 #include "correct/settled_smoother.h"
+#include "correct/variance_in_gaps.h"
 
 namespace unrig {
 
@@ -28,9 +29,9 @@ namespace unrig {
 /// estimated motion: a convolution of its c with the derivative of the response to one spline. Long records are taken piece by piece (core/convolution.h), and these slopes, which are as smooth as
 /// the estimated motion is, are looked at on every few samples (`looked`) where squares of them are summed; what they have in common with the readings is summed over all.
 ///
-/// The shaft is taken to have been on its way before the first sample, as uncertain there as later for given past, and the section is steady there. Missing samples are filled with the
-/// smoother's own estimate, again and again (twelve times at most) until that changes nothing by a tenth of the noise, and leave the band as if they were there. Where both channels are missing for
-/// some dozens of samples it converges too slowly: something of the straight line over the gap remains.
+/// The shaft is taken to have been on its way before the first sample, as uncertain there as later for given past, and the section is steady there. Missing samples are filled with what the smoother
+/// finds there without them: the readings that make chi-square least. What they leave open of the loads is added to their bands (correct/variance_in_gaps.h), but the slopes of chi-square count them as
+/// if they were there.
 class RestlessRun {
  public:
   /// Records of more samples than `in_one_piece` are taken piece by piece.
@@ -41,6 +42,8 @@ class RestlessRun {
   /// Derivatives with respect to `parameters`; the other columns are zero. `linear`: offsets, angle before the motion, signals of effects. Throws NoAnswer where the model does not stay finite.
   RunResidual::Evaluation differentiate(const RunResidual::Solution& solution, const std::vector<Eigen::Index>& parameters) const;
 
+  /// Missing samples as they make chi-square least at theta: by conjugate gradients, the gradient being what the smoother leaves of them over the noise's variance. Returns by how much chi-square falls.
+  double settle_missing(const Eigen::VectorXd& theta);
   /// Noise of each channel from what the model at theta leaves of it, where that is less; angle samples that stand alone are left out, missing ones filled.
   void settle_noise(const Eigen::VectorXd& theta);
   /// tau that makes the readings most probable at theta. `near`: only within a quarter of a decade of what it is, as long as it is found there.
@@ -97,16 +100,19 @@ class RestlessRun {
   double angle_level() const { return conditions_.onset_angle; }
   double dt() const { return run_->dt; }
   const Conditions& conditions() const { return conditions_; }
+  /// What gaps of more than some samples add to the variance of quantities (rows over the filter's states): samples x quantities.
+  Eigen::MatrixXd variance_in_gaps(const Point& point, const Eigen::MatrixXd& rows) const;
+  static constexpr Eigen::Index unnoticed = 5;  ///< missing samples in a row
   Eigen::Index longest_gap() const { return longest_gap_; }
   double longest_gap_at() const { return longest_gap_at_; }  ///< s
 
  private:
   std::shared_ptr<Point> point_at(const Eigen::VectorXd& theta) const;
   void fill_between_neighbours();
-  /// Missing samples as the smoother has them, again and again: each time it knows of what it has filled in itself.
-  void settle_missing(const Eigen::VectorXd& theta);
-  /// Readings without what is found of them, samples x channels.
+  /// What the smoother leaves of readings with these innovations, samples x channels.
+  struct Reader;
   Eigen::MatrixXd left_by_smoother(const Point& point) const;
+  Eigen::Index stride_of_motion() const;  ///< samples to a radian of the fastest that the angle shows
   std::shared_ptr<const Convolution> convolution_for(const Eigen::MatrixXd& L, const LinearSystem& system) const;
   std::vector<Eigen::Index> driven_states() const;
 
@@ -120,7 +126,7 @@ class RestlessRun {
   Eigen::Index motion_state_ = 0;
   Eigen::MatrixXd inputs_;               ///< measured inputs
   Eigen::MatrixXd measured_;             ///< samples x channels, the angle from its level
-  Eigen::Matrix<bool, Eigen::Dynamic, Eigen::Dynamic> missing_;
+  Missing missing_;
   Eigen::VectorXd sigma_;
   double roughness_ = 0.1;
   Eigen::Index observations_ = 0, longest_gap_ = 0;

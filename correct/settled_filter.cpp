@@ -53,8 +53,8 @@ SettledFilter settle(const MatrixXd& F, const VectorXd& b, const MatrixXd& C, co
     arrived = more.cwiseAbs().maxCoeff() < settled * H.cwiseAbs().maxCoeff();
   }
   SettledFilter filter;
+  filter.F = F, filter.C = C, filter.b = b, filter.r = r;
   filter.P = size.asDiagonal() * H * size.asDiagonal();
-  filter.C = C;
   const MatrixXd seen = filter.P * C.transpose();
   MatrixXd S = C * seen;
   S.diagonal() += r;

@@ -11,7 +11,9 @@ namespace unrig {
 ///
 ///   x_(k+1) = L x_k + K y_k,   L = F - K C,   innovations e_k = S^(-1/2) (y_k - C x_k), white of variance 1.
 struct SettledFilter {
-  Eigen::MatrixXd P, K, L, C;
+  Eigen::MatrixXd F, C;
+  Eigen::VectorXd b, r;
+  Eigen::MatrixXd P, K, L;
   Eigen::MatrixXd whiten;  ///< S^(-1/2), lower triangular
   double log_determinant = 0;  ///< of S
 };
