@@ -388,7 +388,7 @@ void correct_restless(const RestlessProblem& problem, CorrectResult& result) {
     looked.e = search.prior.held.empty() ? search.evaluation : run.differentiate(search.solution, all_of(theta.size()));
     const RestlessRun::Point& point = run.at(search.solution.theta);
     looked.slopes = slopes_of(run, point, problem.steady_per_reading);
-    result.reduced_chi2 = looked.e.chi2 / static_cast<double>(run.observations() - static_cast<Index>(search.prior.free.size()) - point.linear.size());
+    result.reduced_chi2 = point.chi2 / static_cast<double>(run.observations() - static_cast<Index>(search.prior.free.size()) - point.linear.size());
     const double read = static_cast<double>(run.observations()) / static_cast<double>((run.outputs() + 1) * run.samples());  // the slopes take missing samples for readings
     looked.inflation = std::sqrt(std::max(1.0, result.reduced_chi2) / read);
     const auto shares = [&](const MatrixXd& F, const MatrixXd& priors) -> UncertaintyBudget::Shares {

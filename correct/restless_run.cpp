@@ -170,7 +170,29 @@ std::shared_ptr<RestlessRun::Point> RestlessRun::point_at(const VectorXd& theta)
   for (Index j = 0; j < unknowns; ++j) point->left -= point->linear[j] * column(*point, j);
   Eigen::Map<VectorXd>(point->white.data(), point->white.size()) -= point->white_columns * point->linear;
   point->chi2 = point->white.squaredNorm();
+  set_freedom(*point, step);
   return point;
+}
+
+void RestlessRun::set_freedom(Point& point, const ExactStep& step) const {
+  const Convolution& convolution = point.smoother->convolution();
+  const VectorXd none = VectorXd::Zero(convolution.far());
+  const Response spline = spline_response(point.system, step, convolution.near(), {});
+  const Index angle = outputs();
+  const double tau = roughness_ * sigma_[angle];
+  for (Index c = 0; c < outputs(); ++c) {
+    const VectorXcd line = convolution.kernel(spline.output.col(c), none).fine;
+    if (c == 0) point.frees.resize(line.size(), outputs());
+    point.frees.col(c) = line.conjugate() / std::pow(sigma_[c], 2);
+  }
+  VectorXd smooth(point.frees.rows());  // Pi / D
+  for (Index k = 0; k < smooth.size(); ++k) {
+    const double w = 2 * std::acos(-1.0) * static_cast<double>(k) / static_cast<double>(convolution.length());
+    const double pi = std::pow(2 - 2 * std::cos(w), 4) / (tau * tau), information = point.frees.row(k).cwiseAbs2() * sigma_.head(outputs()).cwiseAbs2() + std::pow((4 + 2 * std::cos(w)) / (6 * sigma_[angle]), 2);
+    smooth[k] = pi / (information + pi);
+    point.frees.row(k) *= 2 * static_cast<double>(samples()) * smooth[k] / (information + pi);
+  }
+  point.freedom = static_cast<double>(samples()) * (1 - convolution.mean(smooth));
 }
 
 MatrixXd RestlessRun::column(const Point& point, Index j) const {
@@ -228,7 +250,7 @@ RunResidual::Solution RestlessRun::solve(const VectorXd& theta) const {
   constexpr double flutter = 1;
   if (!(growth(theta) < flutter)) return {theta, INFINITY, {}, nullptr};
   const Point& point = at(theta);
-  return {theta, point.chi2, point.linear, nullptr};
+  return {theta, point.objective(), point.linear, nullptr};
 }
 
 VectorXd RestlessRun::motion(const Point& point) const {
@@ -263,6 +285,7 @@ void RestlessRun::slopes(const Point& point, const VectorXd& motion, const std::
       const MatrixXd &near = kernels.near[parameter], &far = kernels.far[parameter];
       if (!near.allFinite() || !far.allFinite())
         throw NoAnswer(fmt::format("{}: over so long a record ({} samples) the model's response to the shaft does not stay finite where the search has come to; correct the run in shorter parts", run_->file, samples()));
+      double freedom = 0;
       // Outputs [first, first + count) into as many of `columns` columns.
       const auto outputs_of = [&](Index first_output, Index wanted, Index columns, const std::vector<Index>& where) {
         std::vector<Convolution::Kernel> kernel;
@@ -272,10 +295,12 @@ void RestlessRun::slopes(const Point& point, const VectorXd& motion, const std::
           if (near.col(first_output + c).isZero(0)) continue;
           kernel.push_back(convolution.kernel(near.col(first_output + c), far.col(first_output + c)));
           sums.push_back({&kernel.back(), motion.data(), Convolution::Direction::past, c});
+          if (first_output == 0) freedom += convolution.mean(kernel.back().fine.cwiseProduct(point.frees.col(c)).real());
         }
         return convolution.sums(sums, columns, where);
       };
-      take(static_cast<Index>(first + j), {outputs_of(0, outputs(), outputs() + 1, {}), at.empty() ? MatrixXd() : outputs_of(outputs(), near.cols() - outputs(), near.cols() - outputs(), at)});
+      MatrixXd readings = outputs_of(0, outputs(), outputs() + 1, {});
+      take(static_cast<Index>(first + j), {std::move(readings), at.empty() ? MatrixXd() : outputs_of(outputs(), near.cols() - outputs(), near.cols() - outputs(), at), freedom});
     }
   });
 }
@@ -305,7 +330,7 @@ RunResidual::Evaluation RestlessRun::differentiate(const RunResidual::Solution& 
   const auto some = static_cast<Index>(looked_at.at.size());
   const VectorXd root = looked_at.weight.cwiseSqrt();
   RunResidual::Evaluation e;
-  e.chi2 = point.chi2;
+  e.chi2 = point.objective();
   e.linear = point.linear;
   e.linear_factor = point.linear_factor;
 
@@ -319,7 +344,7 @@ RunResidual::Evaluation RestlessRun::differentiate(const RunResidual::Solution& 
     all = -all;
     all.noalias() -= point.white_columns * reached;
     along.col(place) = reached;
-    downhill[place] = all.dot(flat(point.white));
+    downhill[place] = all.dot(flat(point.white)) + slope.freedom / 2;
     for (Index c = 0; c < channels; ++c) rows.col(place).segment(c * some, some) = root.cwiseProduct(white.col(c)(looked_at.at));
   });
   e.linear_slope = MatrixXd::Zero(unknowns, count);

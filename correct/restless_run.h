@@ -29,6 +29,13 @@ namespace unrig {
 /// estimated motion: a convolution of its c with the derivative of the response to one spline. Long records are taken piece by piece (core/convolution.h), and these slopes, which are as smooth as
 /// the estimated motion is, are looked at on every few samples (`looked`) where squares of them are summed; what they have in common with the readings is summed over all.
 ///
+/// Chi-square with the motion eliminated is least where the motion takes most of the noise upon itself: it is less by the freedom of the motion, the readings that it takes to determine it,
+///
+///   nu = n mean over w of (1 - Pi / D),   D = |G|^2 / r + |A|^2 / r_a + Pi,   Pi = |1 - e^-iw|^8 / tau^2,
+///
+/// with what a spline does to gauge and angle, G and A. What theta moves of it grows with the record, what a motion's beginning says of theta does not: chi-square + nu is made least, whose slopes at
+/// the true theta are zero on average for a given motion (its noise's part of E d chi2 / d theta is -d nu / d theta).
+///
 /// The shaft is taken to have been on its way before the first sample, as uncertain there as later for given past, and the section is steady there. Missing samples are filled with what the smoother
 /// finds there without them: the readings that make chi-square least. What they leave open of the loads is added to their bands (correct/variance_in_gaps.h), but the slopes of chi-square count them as
 /// if they were there.
@@ -37,7 +44,7 @@ class RestlessRun {
   /// Records of more samples than `in_one_piece` are taken piece by piece.
   RestlessRun(const AeroelasticModel& model, const Run& run, Eigen::Index in_one_piece = 1 << 16);
 
-  /// chi-square infinite where the rig would flutter or diverge within the record.
+  /// What is to be least, chi-square and the motion's freedom; infinite where the rig would flutter or diverge within the record.
   RunResidual::Solution solve(const Eigen::VectorXd& theta) const;
   /// Derivatives with respect to `parameters`; the other columns are zero. `linear`: offsets, angle before the motion, signals of effects. Throws NoAnswer where the model does not stay finite.
   RunResidual::Evaluation differentiate(const RunResidual::Solution& solution, const std::vector<Eigen::Index>& parameters) const;
@@ -64,6 +71,9 @@ class RestlessRun {
     Eigen::MatrixXd left;                  ///< readings without what they reach, samples x channels
     Eigen::MatrixXd white;                 ///< innovations of that
     double chi2 = 0, log_determinant = 0;
+    double freedom = 0;                    ///< of the motion
+    Eigen::MatrixXcd frees;                ///< lines of the spectrum x outputs: times what a spline does to them by a parameter, summed over both, what that parameter does to the freedom
+    double objective() const { return chi2 + freedom; }
   };
   const Point& at(const Eigen::VectorXd& theta) const;
   /// Lets go of all that is as long as the record, here and in the last point: filter and smoother stay.
@@ -79,6 +89,7 @@ class RestlessRun {
   /// Derivatives of the readings, samples x channels, and of the loads at the samples asked for, with that motion, with respect to a parameter.
   struct Slope {
     Eigen::MatrixXd readings, loads;
+    double freedom = 0;
   };
   /// Hands them to `take` with the parameter's place among `parameters`, from several threads at once. No `at`: no loads.
   void slopes(const Point& point, const Eigen::VectorXd& motion, const std::vector<Eigen::Index>& parameters, const std::vector<Eigen::Index>& at,
@@ -107,6 +118,7 @@ class RestlessRun {
   double longest_gap_at() const { return longest_gap_at_; }  ///< s
 
  private:
+  void set_freedom(Point& point, const ExactStep& step) const;
   std::shared_ptr<Point> point_at(const Eigen::VectorXd& theta) const;
   void fill_between_neighbours();
   /// What the smoother leaves of readings with these innovations, samples x channels.
