@@ -232,8 +232,8 @@ VectorXd rougher_than_the_record(const VectorXd& jerk) {
   return rougher;
 }
 
-/// Standard deviations of a load, by sources. `in_gaps`: what missing readings add to the motion's variance.
-void set_bands(const RestlessRun& run, const RestlessRun::Point& point, Index load, const VectorXd& rougher, const VectorXd& in_gaps, const Slopes& slopes, const UncertaintyBudget& budget, double calibration, double inflation,
+/// Standard deviations of a load, by sources. `in_gaps`: what missing readings add to the variances that the motion leaves, by loads, if anything.
+void set_bands(const RestlessRun& run, const RestlessRun::Point& point, Index load, const VectorXd& rougher, const MatrixXd& in_gaps, const Slopes& slopes, const UncertaintyBudget& budget, double calibration, double inflation,
                CorrectedLoad& result) {
   const RowVectorXd over_states = load_row(run, point, load);
   const Eigen::MatrixXf& D = slopes.load[static_cast<std::size_t>(load)];
@@ -247,7 +247,7 @@ void set_bands(const RestlessRun& run, const RestlessRun::Point& point, Index lo
   share[static_cast<std::size_t>(Source::regularisation)] = 1 - gauge - angle;
   const auto of_motion = [&](Index source, Index k) {
     const double by_size = share[static_cast<std::size_t>(source)] * std::max(0.0, variance[k]);
-    return static_cast<Source>(source) == Source::regularisation ? (by_size + in_gaps[k]) * rougher[k] : by_size;
+    return static_cast<Source>(source) == Source::regularisation ? (by_size + (in_gaps.size() > 0 ? in_gaps(k, load) : 0)) * rougher[k] : by_size;
   };
   const double alike = neighbours_alike(run, point, load);
 
@@ -412,7 +412,7 @@ void correct_restless(const RestlessProblem& problem, CorrectResult& result) {
   for (Index l = 0; l < loads; ++l) rows.row(l) = load_row(run, point, l);
   const MatrixXd in_gaps = run.variance_in_gaps(point, rows);
   run.forget_readings();
-  for (Index l = 0; l < loads; ++l) set_bands(run, point, l, rougher, in_gaps.col(l), looked.slopes, *looked.budget, result.calibration_uncertainty, looked.inflation, l == 0 ? result.circulatory : result.normal_force);
+  for (Index l = 0; l < loads; ++l) set_bands(run, point, l, rougher, in_gaps, looked.slopes, *looked.budget, result.calibration_uncertainty, looked.inflation, l == 0 ? result.circulatory : result.normal_force);
   vary_weight(best, looked.e, looked.slopes, model, result);
 
   result.noise = run.sigma()[0];

@@ -150,6 +150,7 @@ std::shared_ptr<RestlessRun::Point> RestlessRun::point_at(const VectorXd& theta)
   const std::shared_ptr<const Convolution> convolution = convolution_for(filter.L, system);
   point->smoother.emplace(std::move(filter), convolution);
   point->log_determinant = point->smoother->filter().log_determinant;
+  set_freedom(*point, step);
 
   // What else reaches the readings: offsets, the level of the angle, signals from any start; and the measured inputs.
   for (const Index i : exogenous_) {
@@ -170,7 +171,6 @@ std::shared_ptr<RestlessRun::Point> RestlessRun::point_at(const VectorXd& theta)
   for (Index j = 0; j < unknowns; ++j) point->left -= point->linear[j] * column(*point, j);
   Eigen::Map<VectorXd>(point->white.data(), point->white.size()) -= point->white_columns * point->linear;
   point->chi2 = point->white.squaredNorm();
-  set_freedom(*point, step);
   return point;
 }
 
@@ -409,7 +409,7 @@ double RestlessRun::settle_missing(const VectorXd& theta) {
 }
 
 MatrixXd RestlessRun::variance_in_gaps(const Point& point, const MatrixXd& rows) const {
-  if (longest_gap_ <= unnoticed) return MatrixXd::Zero(samples(), rows.rows());
+  if (longest_gap_ <= unnoticed) return {};
   Missing long_ones = missing_;
   for (Index c = 0; c < missing_.cols(); ++c)
     for (Index k = 0; k < samples(); ++k) {

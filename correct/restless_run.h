@@ -111,7 +111,7 @@ class RestlessRun {
   double angle_level() const { return conditions_.onset_angle; }
   double dt() const { return run_->dt; }
   const Conditions& conditions() const { return conditions_; }
-  /// What gaps of more than some samples add to the variance of quantities (rows over the filter's states): samples x quantities.
+  /// What gaps of more than some samples add to the variance of quantities (rows over the filter's states): samples x quantities, empty without such gaps.
   Eigen::MatrixXd variance_in_gaps(const Point& point, const Eigen::MatrixXd& rows) const;
   static constexpr Eigen::Index unnoticed = 5;  ///< missing samples in a row
   Eigen::Index longest_gap() const { return longest_gap_; }

@@ -33,8 +33,15 @@ target_compile_options(unrig_sanitizers INTERFACE ${unrig_sanitizers} ${careless
 target_compile_definitions(unrig_sanitizers INTERFACE UNRIG_VERSION="${PROJECT_VERSION}")
 target_link_options(unrig_sanitizers INTERFACE -fsanitize=address,undefined)
 
+set(floors core fit correct)
+set(folders core fit correct verification commands)
+if(UNRIG_SANITIZE STREQUAL "CORE")
+  set(floors core)
+  set(folders core)
+endif()
+
 # sanitised_core is unrig_core again, and so on; each floor stands on its like.
-foreach(floor core fit correct)
+foreach(floor ${floors})
   get_target_property(sources unrig_${floor} SOURCES)
   get_target_property(below unrig_${floor} LINK_LIBRARIES)
   list(TRANSFORM below REPLACE "^unrig_(core|fit|correct)$" "sanitised_\\1")
@@ -45,8 +52,10 @@ foreach(floor core fit correct)
   target_include_directories(sanitised_${floor} PUBLIC ${PROJECT_SOURCE_DIR})
   target_link_libraries(sanitised_${floor} PUBLIC ${below} unrig_sanitizers)
 endforeach()
-add_executable(sanitised_unrig ${PROJECT_SOURCE_DIR}/correct/main.cpp)
-target_link_libraries(sanitised_unrig PRIVATE sanitised_correct CLI11::CLI11)
+if(correct IN_LIST floors)
+  add_executable(sanitised_unrig ${PROJECT_SOURCE_DIR}/correct/main.cpp)
+  target_link_libraries(sanitised_unrig PRIVATE sanitised_correct CLI11::CLI11)
+endif()
 
 # The same tests, called sanitised.core.* and so on, but for what is left out, by name as --gtest_filter takes it.
 set(left_out Lengths.AMillionSamplesFitIntoASixthOfAGigabyte  # memory under AddressSanitizer is another
@@ -59,7 +68,7 @@ if(NOT UNRIG_SANITIZE STREQUAL "ALL")  # ten seconds and more each, half an hour
     Restless.APlaceThatIsRougherThanTheRestIsNamed Report.ADiagnosisShowsItsRecordingsAndBothModels ReportInABrowser.LoadsDrawsAndZooms)
 endif()
 list(JOIN left_out ":" left_out)
-foreach(folder core fit correct verification commands)
+foreach(folder ${folders})
   get_target_property(libraries test_${folder} LINK_LIBRARIES)
   list(TRANSFORM libraries REPLACE "^unrig_(core|fit|correct)$" "sanitised_\\1")
   get_target_property(objects test_${folder} SOURCES)
@@ -68,7 +77,9 @@ foreach(folder core fit correct verification commands)
   set_target_properties(sanitised_test_${folder} PROPERTIES CROSSCOMPILING_EMULATOR "${in_this_environment}")
   gtest_discover_tests(sanitised_test_${folder} TEST_PREFIX sanitised.${folder}. TEST_FILTER "-${left_out}" DISCOVERY_TIMEOUT 60 PROPERTIES TIMEOUT 9000)
 endforeach()
-add_dependencies(sanitised_test_commands sanitised_unrig)
+if(commands IN_LIST folders)
+  add_dependencies(sanitised_test_commands sanitised_unrig)
+endif()
 
 # The readers of files on the corpora of their fuzzers (fuzz/README.md).
 add_library(unrig_replay OBJECT fuzz/replay.cpp)

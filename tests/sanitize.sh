@@ -3,7 +3,8 @@
 #
 #   sh tests/sanitize.sh                       the whole suite, hours
 #   sh tests/sanitize.sh REGEX                 the tests whose names match, as `ctest -R` takes it: sanitised.core, say
-#   UNRIG_SANITIZE=ON sh tests/sanitize.sh     all but the longest (sanitised.cmake has the list), as CI does
+#   UNRIG_SANITIZE=ON sh tests/sanitize.sh     all but the longest (sanitised.cmake has the list), as CI does where there is time
+#   UNRIG_SANITIZE=CORE sh tests/sanitize.sh   those of core and of the readers of files
 #
 # CMAKE_BUILD_PARALLEL_LEVEL and CTEST_PARALLEL_LEVEL set how many jobs run at once; otherwise as many as there are processors.
 set -eu

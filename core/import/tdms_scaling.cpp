@@ -99,9 +99,9 @@ Bridge bridge_of(const Scale& scale) {
   return bridge;
 }
 
-class Chain {
+class ScalingChain {
  public:
-  Chain(const TdmsProperties& properties, const RawValues& raw) : properties_(&properties), raw_(&raw) {}
+  ScalingChain(const TdmsProperties& properties, const RawValues& raw) : properties_(&properties), raw_(&raw) {}
 
   /// What stands behind the scale `index`. `depth` ends circles, and chains in which every scale is worked out twice over.
   Values after(std::uint32_t index, int depth = 0) const {
@@ -171,7 +171,7 @@ TdmsScaled scaled(const TdmsProperties& properties, RawValues raw, bool integers
   }
   if (!(*count < 10000)) return unscaled("the file gives a senseless number of scales");
   try {
-    return {Chain(properties, raw).after(static_cast<std::uint32_t>(*count) - 1), ""};
+    return {ScalingChain(properties, raw).after(static_cast<std::uint32_t>(*count) - 1), ""};
   } catch (const NoScale& e) {
     return unscaled(e.what());
   }
