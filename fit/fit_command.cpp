@@ -3,6 +3,9 @@
 #include <CLI/CLI.hpp>
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <filesystem>
+
 #include "core/command.h"
 #include "core/given_files.h"
 #include "core/in_parallel.h"
@@ -20,7 +23,7 @@ int fit_command(int argc, char** argv) {
   std::vector<std::string> run_paths, starts, effect_ids;
   double least = 0.1;
   app.add_option("--rig", rig_path, "rig file (TOML)")->required();
-  app.add_option("runs", run_paths, "run files (CSV): free decays and steps of this rig, in any number")->required();
+  app.add_option("runs", run_paths, "run files (CSV): free decays and steps of this rig, one or more");
   app.add_option("-o,--output", output, "result (JSON)")->required();
   app.add_option("--effect", effect_ids, "physics beyond the rig model that is at work, one of those below (repeatable)")->allow_extra_args(false);
   app.add_option("--start", starts, "start value of a parameter, NAME=VALUE (repeatable)")->allow_extra_args(false);
@@ -31,6 +34,12 @@ int fit_command(int argc, char** argv) {
   app.footer(effect_list() + "\nExample:\n  unrig fit --rig rig.toml dry_pluck.csv wet_pluck.csv step_a.csv -o fit.json");
   try {
     app.parse(argc, argv);
+    std::erase_if(problem.profile, [](const std::string& name) { return name.empty() || name == "{}"; });  // how CLI11 says that nothing follows
+    // Runs behind `--profile`.
+    const auto files = std::stable_partition(problem.profile.begin(), problem.profile.end(), [](const std::string& name) { return !std::filesystem::exists(name); });
+    run_paths.insert(run_paths.end(), files, problem.profile.end());
+    problem.profile.erase(files, problem.profile.end());
+    if (run_paths.empty()) throw CLI::RequiredError("runs");
   } catch (const CLI::ParseError& e) {
     return app.exit(e) == 0 ? exit_done : exit_wrong_use;
   }
@@ -39,7 +48,6 @@ int fit_command(int argc, char** argv) {
   inputs.push_back(rig_path);
   check_outputs({{"-o", output}}, inputs);
   check_given_once(run_paths);
-  std::erase_if(problem.profile, [](const std::string& name) { return name.empty() || name == "{}"; });  // how CLI11 says that nothing follows
   if (profile->count() > 0 && problem.profile.empty()) problem.profile = {"all"};
   problem.rig = read_rig(rig_path);
   try {

@@ -102,9 +102,13 @@ SimulateProblem problem_of(const Options& options) {
   for (const std::string& warning : rig.warnings) warn(warning);
   Run run = read_run(options.run);
   for (const std::string& warning : run.warnings) warn(warning);
-  if (!options.as_recorded && !options.jumps) take_out_noise_of_the_angle(rig, run);
   std::optional<FittedRig> fit;
   if (!options.fit.empty()) fit = read_fit(options.fit);
+  if (fit && fit->had_other_readings(run))
+    warn(fmt::format("{}: other readings or conditions than those that {} was fitted to; it is simulated with the slope and the steady load of the fitted ones all the same. Fit again, or give the new recording "
+                     "another name.",
+                     run.file, fit->file));
+  if (!options.as_recorded && !options.jumps) take_out_noise_of_the_angle(rig, run);
 
   std::optional<TabulatedIndicial> table;
   if (!options.indicial.empty()) table = read_indicial(options.indicial);

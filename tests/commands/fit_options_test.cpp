@@ -93,6 +93,18 @@ TEST(FitOptions, ProfileLikelihoodOfWhatIsAskedFor) {
   EXPECT_EQ(json::parse(read_text(directory.path("fit.json")))["profile"].size(), 2u) << "the mass is held";
 }
 
+TEST(FitOptions, RunsMayStandBehindProfile) {
+  const TemporaryDirectory directory;
+  const std::string run = decay(directory), rig = rig_file(directory), out = directory.path("fit.json");
+  ASSERT_EQ(run_unrig(directory, {"fit", "--rig", rig, "-o", out, "--profile", run}).status, 0);
+  EXPECT_EQ(json::parse(read_text(out))["profile"].size(), 2u) << "all, as without a name";
+  ASSERT_EQ(run_unrig(directory, {"fit", "--rig", rig, "-o", out, "--profile", "modal[1].stiffness", run}).status, 0);
+  EXPECT_EQ(json::parse(read_text(out))["profile"].size(), 1u);
+  const Finished none = run_unrig(directory, {"fit", "--rig", rig, "-o", out, "--profile", "modal[1].stiffness"});
+  EXPECT_EQ(none.status, 2);
+  EXPECT_THAT(none.err, HasSubstr("runs is required"));
+}
+
 TEST(FitOptions, ProfileOfAParameterThatNothingDeterminesHasNoEnd) {
   const TemporaryDirectory directory;
   ASSERT_EQ(fit_of(directory, decay(directory), {"--profile", "modal[1].mass"}).status, 0);

@@ -6,6 +6,9 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <string_view>
+
+#include <fmt/format.h>
 
 #include "core/error.h"
 #include "tests/support/tdms_writer.h"
@@ -55,6 +58,50 @@ TEST(Tdms, FollowsFragmentsThatTakeOverTheObjectsBefore) {
   const Recording r = read_tdms(bytes, "f");
   EXPECT_EQ(r.channels[0].value, (Values{1, 2, 3, 4, 5}));
   EXPECT_EQ(r.channels[1].value, (Values{10, 11, 12, 13}));
+}
+
+/// Bytes as a description prints them: pairs of hexadecimal digits, spaces ignored.
+std::string bytes_of(std::string_view hexadecimal) {
+  std::string bytes, digits;
+  for (const char c : hexadecimal) {
+    if (c == ' ') continue;
+    digits += c;
+    if (digits.size() == 2) bytes += static_cast<char>(std::stoi(digits, nullptr, 16)), digits.clear();
+  }
+  return bytes;
+}
+
+/// The file that NI's description builds up in six writing iterations ("TDMS File Format Internal Structure", section Optimization, incremental meta information), byte by byte as printed there: chunks
+/// that are appended, a property that changes, a channel that comes in, one that grows and then stops.
+TEST(Tdms, ReadsTheFileOfNisOwnDescription) {
+  const std::string lead = "54 44 53 6D", path_1 = "13 00 00 00 2F 27 67 72 6F 75 70 27 2F 27 63 68 61 6E 6E 65 6C 31 27", path_2 = "13 00 00 00 2F 27 67 72 6F 75 70 27 2F 27 63 68 61 6E 6E 65 6C 32 27",
+                    path_3 = "12 00 00 00 2F 27 67 72 6F 75 70 27 2F 27 76 6F 6C 74 61 67 65 27", raw_1 = "01 00 00 00 02 00 00 00 03 00 00 00", raw_2 = "04 00 00 00 05 00 00 00 06 00 00 00",
+                    raw_3 = "07 00 00 00 08 00 00 00 09 00 00 00 0A 00 00 00 0B 00 00 00";
+  std::string counted;
+  for (int k = 1; k <= 27; ++k) counted += fmt::format("{:02X} 00 00 00 ", k);
+  const std::string file = lead + "0E 00 00 00 69 12 00 00 A7 00 00 00 00 00 00 00 77 00 00 00 00 00 00 00" + "02 00 00 00" + path_1 +
+                           "14 00 00 00 03 00 00 00 01 00 00 00 03 00 00 00 00 00 00 00 01 00 00 00 04 00 00 00 70 72 6F 70 20 00 00 00 05 00 00 00 76 61 6C 69 64" + path_2 +
+                           "14 00 00 00 03 00 00 00 01 00 00 00 03 00 00 00 00 00 00 00 00 00 00 00" + raw_1 + raw_2 + raw_1 + raw_2 +  //
+                           lead + "0A 00 00 00 69 12 00 00 50 00 00 00 00 00 00 00 38 00 00 00 00 00 00 00" + "01 00 00 00" + path_1 +
+                           "00 00 00 00 01 00 00 00 04 00 00 00 70 72 6F 70 20 00 00 00 05 00 00 00 65 72 72 6F 72" + raw_1 + raw_2 +  //
+                           lead + "0A 00 00 00 69 12 00 00 5E 00 00 00 00 00 00 00 32 00 00 00 00 00 00 00" + "01 00 00 00" + path_3 +
+                           "14 00 00 00 03 00 00 00 01 00 00 00 05 00 00 00 00 00 00 00 00 00 00 00" + raw_1 + raw_2 + raw_3 +  //
+                           lead + "0A 00 00 00 69 12 00 00 BF 00 00 00 00 00 00 00 33 00 00 00 00 00 00 00" + "01 00 00 00" + path_2 +
+                           "14 00 00 00 03 00 00 00 01 00 00 00 1B 00 00 00 00 00 00 00 00 00 00 00" + raw_1 + counted + raw_3 +  //
+                           lead + "0E 00 00 00 69 12 00 00 61 00 00 00 00 00 00 00 41 00 00 00 00 00 00 00" + "02 00 00 00" + path_1 + "00 00 00 00 00 00 00 00" + path_3 + "00 00 00 00 00 00 00 00" +
+                           raw_1 + raw_3;
+  const Recording r = read_tdms(bytes_of(file), "f");
+  Values one, two, voltage;
+  for (int k = 0; k < 6; ++k) one.insert(one.end(), {1, 2, 3});
+  for (int k = 0; k < 4; ++k) two.insert(two.end(), {4, 5, 6});
+  for (int k = 1; k <= 27; ++k) two.push_back(k);
+  for (int k = 0; k < 3; ++k) voltage.insert(voltage.end(), {7, 8, 9, 10, 11});
+  ASSERT_EQ(r.channels.size(), 3u);
+  EXPECT_EQ(r.channels[0].name, "group/channel1");
+  EXPECT_EQ(r.channels[0].value, one);
+  EXPECT_EQ(r.channels[1].value, two);
+  EXPECT_EQ(r.channels[2].name, "group/voltage");
+  EXPECT_EQ(r.channels[2].value, voltage);
 }
 
 TEST(Tdms, KeepsWhatIsWholeInACutFile) {
