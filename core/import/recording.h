@@ -6,7 +6,7 @@ namespace unrig {
 
 /// One column of a laboratory's file as a reader hands it on: physical values, or counts that are marked as such.
 struct RecordedChannel {
-  std::string name;            ///< "group/channel", "struct.field", the header's name, "node:direction"
+  std::string name;            ///< "group/channel", "struct.field", the header's name, "node:direction", a label
   std::string unit;            ///< as the file says; empty where it does not
   std::vector<double> value;
   std::string raw;             ///< not empty: these are unscaled converter counts, and why they could not be scaled

@@ -9,6 +9,7 @@
 
 #include "core/error.h"
 #include "core/import/byte_reader.h"
+#include "core/import/delimited.h"
 #include "core/scan.h"
 
 namespace unrig {
@@ -16,6 +17,9 @@ namespace {
 
 /// The columns [first, first + width) of a line, without blanks around.
 std::string_view field(std::string_view line, std::size_t first, std::size_t width) { return first < line.size() ? trimmed(line.substr(first, width)) : std::string_view{}; }
+
+/// What a field says, if anything.
+std::string told(std::string_view field) { return field == "NONE" ? "" : in_utf8(std::string(field)); }
 
 /// Fortran writes exponents with D too.
 bool read_fortran(std::string_view text, double& value) {
@@ -105,7 +109,8 @@ class UffFile {
     const auto axis = static_cast<std::size_t>(std::abs(direction));
     std::string name = axis < axes.size() ? axes[axis] : fmt::format("{}", direction);
     if (direction < 0 && axis < axes.size()) name[0] = '-';
-    h.name = fmt::format("{}:{}", integer(entity, 41, 10, "the node"), name);
+    const int node = integer(entity, 41, 10, "the node");
+    h.name = fmt::format("{}:{}", node, name);
     const std::string_view form = line();
     h.ordinate = integer(form, 0, 10, "the type of the ordinate");
     const int points = integer(form, 10, 10, "the number of points");
@@ -117,8 +122,11 @@ class UffFile {
     if (points < 0 || static_cast<std::size_t>(points) > bytes_.size() / 4) refuse(fmt::format("{} points in a file of {} bytes", points, bytes_.size()));
     h.points = static_cast<std::size_t>(points);
     line();  // abscissa
-    h.unit = field(line(), 47, 20);
-    if (h.unit == "NONE") h.unit.clear();
+    const std::string_view ordinate = line();
+    h.unit = told(field(ordinate, 47, 20));
+    if (node == 0)  // as from amplifiers, which know of no structure
+      for (const std::string& called : {told(h.title), told(field(ordinate, 26, 20))})
+        if (!called.empty()) h.name = called;
     line();  // denominator
     line();  // z axis
     return h;

@@ -78,6 +78,31 @@ TEST(Uff, SkipsOtherDatasetsAndTellsRepeatedNamesApart) {
   EXPECT_EQ(r.channels[1].name, "3:+Z#2");
 }
 
+/// The layout of an amplifier's own software (HBM catman): every line filled up to 80 columns, exponents of three digits, nodes that are all 0, so that only the labels tell channels apart.
+TEST(Uff, ReadsTheLayoutOfAnAmplifiersSoftware) {
+  const auto dataset = [](const std::string& label, const std::string& carriage_return) {
+    std::string text;
+    for (const std::string& line : {std::string("    -1"), std::string("    58"), label + " : V", std::string("UFF58 file"), std::string("21-Nov-26 10:00:00"), std::string("NONE"), std::string("NONE"),
+                                    std::string("    1         0    0         0 NONE               0   0 NONE               0   0"),
+                                    std::string("         2         7         1 0.00000E+000 5.00000E-005 0.00000E+000"), std::string("        17    0    0    0 Time                 s"),
+                                    fmt::format("         1    0    0    0 {:<20} m/s\xB2", label), std::string("         0    0    0    0 NONE                 NONE"),
+                                    std::string("         0    0    0    0 NONE                 NONE"),
+                                    std::string("  1.00000E+00 -2.00000E+00  3.00000E-03  4.00000E+10 -5.00000E+00  6.00000E+00"), std::string("  7.00000E+00"), std::string("    -1")})
+      text += fmt::format("{:<80}{}\n", line, carriage_return);
+    return text;
+  };
+  for (const char* carriage_return : {"", "\r"}) {
+    const Recording r = read_uff(dataset("Bridge", carriage_return) + dataset("Angle", carriage_return) + dataset("NONE", carriage_return), "f");
+    ASSERT_EQ(r.channels.size(), 3u);
+    EXPECT_EQ(r.channels[0].name, "Bridge");
+    EXPECT_EQ(r.channels[0].unit, "m/s\xC2\xB2") << "out of Latin-1";
+    EXPECT_EQ(r.channels[0].step, 5e-5);
+    EXPECT_EQ(r.channels[0].value, (Values{1, -2, 3e-3, 4e10, -5, 6, 7}));
+    EXPECT_EQ(r.channels[1].name, "Angle");
+    EXPECT_EQ(r.channels[2].name, "NONE : V") << "its first line is all there is";
+  }
+}
+
 TEST(Uff, RefusesWhatIsCutOffOrNotAsItSays) {
   const auto complaint = [](const std::string& bytes) -> std::string {
     try {
