@@ -12,7 +12,7 @@ set(in_this_environment env LSAN_OPTIONS=suppressions=${CMAKE_CURRENT_SOURCE_DIR
 
 set_property(DIRECTORY APPEND PROPERTY CMAKE_CONFIGURE_DEPENDS fuzz/sources.txt)
 file(STRINGS fuzz/sources.txt careful)
-list(APPEND careful core/run_text.cpp core/import/import.cpp core/import/delimited.cpp)
+list(APPEND careful core/run_text.cpp core/import/import.cpp)
 list(TRANSFORM careful PREPEND ${PROJECT_SOURCE_DIR}/)
 set_source_files_properties(${careful} PROPERTIES SKIP_UNITY_BUILD_INCLUSION ON COMPILE_OPTIONS "${careful_of_pointers}")
 # As in the floors' own lists: source properties hold in one directory.
