@@ -76,11 +76,13 @@ Index enough_to_begin_with(const Run& run, std::vector<std::string> channels) {
 /// minimise(), with missing readings as they are best at what it finds: searched again as long as that changes them.
 Search minimise_with_gaps(RestlessRun& run, const AeroelasticModel& model, const Prior& prior, VectorXd theta, double well, bool learn) {
   constexpr int most = 10;
-  constexpr double same = 0.1;  // of chi-square: a third of a standard deviation at most
-  for (int round = 1;; ++round) {
+  constexpr double same = 0.1, slowest = 0.95;  // of chi-square: a third of a standard deviation
+  for (double round = 1, before = INFINITY;; ++round) {
     Search search = minimise(searched(run, model, prior), prior, theta, well, learn);
     theta = search.solution.theta;
-    if (round == most || run.settle_missing(theta) < same) return search;
+    const double fall = run.settle_missing(theta), again = std::min(slowest, fall / before);  // each fall this share of the one before
+    if (round == most || !(fall * std::max(1.0, again / (1 - again)) >= same)) return search;
+    before = fall;
   }
 }
 
@@ -247,7 +249,7 @@ void set_bands(const RestlessRun& run, const RestlessRun::Point& point, Index lo
   share[static_cast<std::size_t>(Source::regularisation)] = 1 - gauge - angle;
   const auto of_motion = [&](Index source, Index k) {
     const double by_size = share[static_cast<std::size_t>(source)] * std::max(0.0, variance[k]);
-    return static_cast<Source>(source) == Source::regularisation ? (by_size + (in_gaps.size() > 0 ? in_gaps(k, load) : 0)) * rougher[k] : by_size;
+    return static_cast<Source>(source) == Source::regularisation ? (by_size + (in_gaps.size() > 0 ? in_gaps(k, load) * inflation * inflation : 0)) * rougher[k] : by_size;
   };
   const double alike = neighbours_alike(run, point, load);
 
@@ -368,39 +370,39 @@ void correct_restless(const RestlessProblem& problem, CorrectResult& result) {
   const AeroelasticModel& model = problem.model;
   RestlessRun run(model, problem.run);
   const Search free = estimate(run, model, problem);
-  Search best = free;
-  if (problem.imposed.any()) {
-    constexpr double well = 1e-2;
-    const Prior imposed = impose(free.prior, problem.imposed, model, response_semichords(problem.semichords));
-    best = minimise_with_gaps(run, model, imposed, free.solution.theta, well, false);
-    best.determined = free.determined;
-  }
-  const VectorXd& theta = best.solution.theta;
-
   struct Looked {
     RunResidual::Evaluation e;
     Slopes slopes;
     std::optional<UncertaintyBudget> budget;
     double inflation = 1;
   };
+  constexpr double least_read = 1e-3;
   const auto look = [&](const Search& search) {
     Looked looked;
-    looked.e = search.prior.held.empty() ? search.evaluation : run.differentiate(search.solution, all_of(theta.size()));
+    looked.e = search.prior.held.empty() ? search.evaluation : run.differentiate(search.solution, all_of(search.solution.theta.size()));
     const RestlessRun::Point& point = run.at(search.solution.theta);
     looked.slopes = slopes_of(run, point, problem.steady_per_reading);
     result.reduced_chi2 = point.chi2 / static_cast<double>(run.observations() - static_cast<Index>(search.prior.free.size()) - point.linear.size());
-    const double read = static_cast<double>(run.observations()) / static_cast<double>((run.outputs() + 1) * run.samples());  // the slopes take missing samples for readings
-    looked.inflation = std::sqrt(std::max(1.0, result.reduced_chi2) / read);
+    looked.inflation = std::sqrt(std::max(1.0, result.reduced_chi2));
+    const double read = static_cast<double>(run.whole_samples()) / static_cast<double>(run.samples());  // the slopes take missing samples for readings
     const auto shares = [&](const MatrixXd& F, const MatrixXd& priors) -> UncertaintyBudget::Shares {
       const MatrixXd angle = F.transpose() * looked.slopes.angle_information * F, gauge = F.transpose() * looked.slopes.gauge_information * F;
       return {angle, MatrixXd::Identity(F.cols(), F.cols()) - priors - gauge - angle};
     };
     const auto reading = [&](const MatrixXd& F, const MatrixXd&) -> VectorXd { return F * (F.transpose() * looked.slopes.answer_to_reading); };
-    looked.budget.emplace(looked.e, search.prior, shares, reading, result.calibration_uncertainty, looked.inflation);
+    looked.budget.emplace(looked.e, search.prior, shares, reading, result.calibration_uncertainty, looked.inflation / std::sqrt(std::max(read, least_read)));
     return looked;
   };
   IndicialResponse tests;
-  if (problem.imposed.any()) tests = indicial_response(model, free.solution.theta, *look(free).budget, problem.semichords, result.semichords_per_second);
+  Search best = free;
+  if (problem.imposed.any()) {
+    tests = indicial_response(model, free.solution.theta, *look(free).budget, problem.semichords, result.semichords_per_second);
+    constexpr double well = 1e-2;
+    const Prior imposed = impose(free.prior, problem.imposed, model, response_semichords(problem.semichords));
+    best = minimise_with_gaps(run, model, imposed, free.solution.theta, well, false);
+    best.determined = free.determined;
+  }
+  const VectorXd& theta = best.solution.theta;
   const Looked looked = look(best);
   const RestlessRun::Point& point = run.at(theta);
   result.indicial = indicial_response(model, theta, *looked.budget, problem.semichords, result.semichords_per_second);

@@ -109,6 +109,8 @@ RestlessRun::RestlessRun(const AeroelasticModel& model, const Run& run, Index in
 void RestlessRun::fill_between_neighbours() {
   const Index n = samples();
   observations_ = measured_.size() - missing_.count();
+  whole_ = 0;
+  for (Index k = 0; k < n; ++k) whole_ += missing_.row(k).any() ? 0 : 1;
   longest_gap_ = 0;
   for (Index c = 0; c < measured_.cols(); ++c)
     for (Index k = 0; k < n; ++k) {
@@ -190,9 +192,9 @@ void RestlessRun::set_freedom(Point& point, const ExactStep& step) const {
     const double w = 2 * std::acos(-1.0) * static_cast<double>(k) / static_cast<double>(convolution.length());
     const double pi = std::pow(2 - 2 * std::cos(w), 4) / (tau * tau), information = point.frees.row(k).cwiseAbs2() * sigma_.head(outputs()).cwiseAbs2() + std::pow((4 + 2 * std::cos(w)) / (6 * sigma_[angle]), 2);
     smooth[k] = pi / (information + pi);
-    point.frees.row(k) *= 2 * static_cast<double>(samples()) * smooth[k] / (information + pi);
+    point.frees.row(k) *= 2 * static_cast<double>(whole_) * smooth[k] / (information + pi);
   }
-  point.freedom = static_cast<double>(samples()) * (1 - convolution.mean(smooth));
+  point.freedom = static_cast<double>(whole_) * (1 - convolution.mean(smooth));
 }
 
 MatrixXd RestlessRun::column(const Point& point, Index j) const {
@@ -236,6 +238,7 @@ void RestlessRun::forget_readings() {
   if (!last_) return;
   last_->signals.clear();
   for (MatrixXd* m : {&last_->white_columns, &last_->left, &last_->white}) m->resize(0, 0);
+  last_->frees.resize(0, 0);
 }
 
 double RestlessRun::growth(const VectorXd& theta) const {
@@ -374,8 +377,11 @@ struct RestlessRun::Reader {
 MatrixXd RestlessRun::left_by_smoother(const Point& point) const { return Reader(point).left(point.left, point.white); }
 
 double RestlessRun::settle_missing(const VectorXd& theta) {
-  constexpr int most = 300, in_a_row = 4;
+  constexpr int most = 300;
   constexpr double little = 1e-3;  // of chi-square
+  // In a gap of all channels chi-square falls by steps, with plateaus between that go with its length. In long records each step is dear.
+  constexpr Index per_plateau = 8, fewest = 4, most_in_a_row = 64, dear = 1 << 22;
+  const Index in_a_row = std::max(fewest, std::min({longest_gap_ / per_plateau, most_in_a_row, dear / samples()}));
   if (!missing_.any()) return 0;
   const Point& point = at(theta);
   const Reader reader(point);
@@ -391,7 +397,8 @@ double RestlessRun::settle_missing(const VectorXd& theta) {
   };
   MatrixXd left = -uphill(reader.left(point.left, point.white)), direction = left, change = none;
   double fall = 0, squares = left.squaredNorm();
-  for (int step = 0, small = 0; step < most && small < in_a_row && squares > 0; ++step) {
+  Index small = 0;
+  for (int step = 0; step < most && small < in_a_row && squares > 0; ++step) {
     const MatrixXd bent = uphill(left_of(direction * sigma_.asDiagonal()));
     const double bend = direction.cwiseProduct(bent).sum();
     if (!(bend > 0)) break;  // rounding
@@ -442,7 +449,10 @@ void RestlessRun::settle_noise(const VectorXd& theta) {
     std::vector<Index> spikes;
     for (Index k = 0; k < n; ++k)
       if (off(k) && !(off(k - 1) && off(k + 1)) && !(off(k - 2) && off(k - 1)) && !(off(k + 1) && off(k + 2))) spikes.push_back(k);
-    for (const Index k : spikes) missing_(k, c) = true, filled(k, c) -= left[k], --observations_;
+    for (const Index k : spikes) {
+      if (!missing_.row(k).any()) --whole_;
+      missing_(k, c) = true, filled(k, c) -= left[k], --observations_;
+    }
   }
   measured_ = filled;
   last_.reset();

@@ -33,12 +33,13 @@ namespace unrig {
 ///
 ///   nu = n mean over w of (1 - Pi / D),   D = |G|^2 / r + |A|^2 / r_a + Pi,   Pi = |1 - e^-iw|^8 / tau^2,
 ///
-/// with what a spline does to gauge and angle, G and A. What theta moves of it grows with the record, what a motion's beginning says of theta does not: chi-square + nu is made least, whose slopes at
-/// the true theta are zero on average for a given motion (its noise's part of E d chi2 / d theta is -d nu / d theta).
+/// with what a spline does to gauge and angle, G and A. What theta moves of it grows with the record, what a motion's beginning says of theta does not: chi-square + nu is made least, of whose
+/// slopes at the true theta the noise's part is zero on average (that of E d chi2 / d theta is -d nu / d theta); what the smoother flattens of the motion itself remains. Only samples of which nothing
+/// is missing count in n.
 ///
 /// The shaft is taken to have been on its way before the first sample, as uncertain there as later for given past, and the section is steady there. Missing samples are filled with what the smoother
-/// finds there without them: the readings that make chi-square least. What they leave open of the loads is added to their bands (correct/variance_in_gaps.h), but the slopes of chi-square count them as
-/// if they were there.
+/// finds there without them: the readings that make chi-square least, or nearly so in long gaps of long records (settle_missing). What gaps of more than `unnoticed` samples leave open of the loads is
+/// added to their bands (correct/variance_in_gaps.h); the slopes of chi-square count all as if they were there, which who asks for bands has to make up for.
 class RestlessRun {
  public:
   /// Records of more samples than `in_one_piece` are taken piece by piece.
@@ -105,6 +106,7 @@ class RestlessRun {
   Eigen::Index outputs() const { return static_cast<Eigen::Index>(channels_.size()); }  ///< fitted channels but the angle, which comes last
   Eigen::Index samples() const { return run_->samples(); }
   Eigen::Index observations() const { return observations_; }
+  Eigen::Index whole_samples() const { return whole_; }  ///< of which nothing is missing
   Eigen::Index motion_state() const { return motion_state_; }
   const Eigen::VectorXd& sigma() const { return sigma_; }
   double roughness() const { return roughness_; }  ///< tau over the noise of the angle
@@ -141,7 +143,7 @@ class RestlessRun {
   Missing missing_;
   Eigen::VectorXd sigma_;
   double roughness_ = 0.1;
-  Eigen::Index observations_ = 0, longest_gap_ = 0;
+  Eigen::Index observations_ = 0, longest_gap_ = 0, whole_ = 0;  ///< whole_: samples of which nothing is missing
   double longest_gap_at_ = 0;
   mutable std::shared_ptr<const Convolution> convolution_;
   mutable std::shared_ptr<Point> last_;

@@ -3,6 +3,7 @@
 #include <Eigen/LU>
 #include <algorithm>
 #include <map>
+#include <memory>
 #include <utility>
 #include <vector>
 
@@ -114,26 +115,35 @@ class Gaps {
     const Index samples = missing_.rows();
     struct Before {
       Index at;
+      bool whole;
       const Stretch* stretch;
-      MatrixXd P;
+      std::shared_ptr<const MatrixXd> P;  // one for as long as it does not change
     };
+    constexpr double unchanged = 1e-10;
     std::vector<Before> way;
-    MatrixXd P = P_;
+    auto P = std::make_shared<const MatrixXd>(P_);
     Index end = first;
     for (int settled = 0; end < samples && (without(end) != 0 || settled < in_a_row);) {
       const bool whole = is_whole(end);
       const Stretch& here = stretch(without(end), whole);
-      way.push_back({end, &here, P});
-      P = here.covariance_behind(P);
-      settled = alike(rows_, P, P_) ? settled + 1 : 0;
+      way.push_back({end, whole, &here, P});
+      auto next = std::make_shared<const MatrixXd>(here.covariance_behind(*P));
+      if ((*next - *P).norm() > unchanged * P->norm()) P = std::move(next);
+      settled = alike(rows_, *P, P_) ? settled + 1 : 0;
       end += whole ? stride_ : 1;
     }
-    MatrixXd Lambda = end < samples ? Lambda_ : MatrixXd(MatrixXd::Zero(P.rows(), P.rows()));
+    const bool to_the_end = end == samples;
+    MatrixXd Lambda = to_the_end ? MatrixXd(MatrixXd::Zero(P_.rows(), P_.rows())) : Lambda_, without_gaps = Lambda;
+    RowVectorXd usual = usual_;
     Index behind = end;
     RowVectorXd value_behind;
-    const auto back_to = [&](Index at, const Stretch& over, const MatrixXd& P_there) {
+    const auto back_to = [&](Index at, bool whole, const Stretch& over, const MatrixXd& P_there) {
       Lambda = over.information_before(Lambda);
-      const RowVectorXd value = (variance(P_there, Lambda) - usual_).cwiseMax(0);
+      if (to_the_end) {
+        without_gaps = stretch(0, whole).information_before(without_gaps);
+        usual = variance(P_, without_gaps);
+      }
+      const RowVectorXd value = (variance(P_there, Lambda) - usual).cwiseMax(0);
       if (value_behind.size() == 0) value_behind = value;
       for (Index k = at; k < behind; ++k) {
         const double part = static_cast<double>(k - at) / static_cast<double>(behind - at);
@@ -142,11 +152,11 @@ class Gaps {
       behind = at;
       value_behind = value;
     };
-    for (auto place = way.rbegin(); place != way.rend(); ++place) back_to(place->at, *place->stretch, place->P);
+    for (auto place = way.rbegin(); place != way.rend(); ++place) back_to(place->at, place->whole, *place->stretch, *place->P);
     for (int forgotten = 0; behind > 0 && forgotten < in_a_row;) {
       const bool whole = behind >= stride_;
-      back_to(behind - (whole ? stride_ : 1), stretch(0, whole), P_);
-      forgotten = (value_behind.array() < enough * usual_.array()).all() ? forgotten + 1 : 0;
+      back_to(behind - (whole ? stride_ : 1), whole, stretch(0, whole), P_);
+      forgotten = (value_behind.array() < enough * usual.array()).all() ? forgotten + 1 : 0;
     }
     return end;
   }

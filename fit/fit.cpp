@@ -72,7 +72,7 @@ void check_names(const AeroelasticModel& model, const FitProblem& problem) {
   for (const auto& [name, value] : problem.start)
     if (!known(name)) throw InputError({"--start", 0}, "no parameter '" + name + "'", "wanted one of " + names, "");
   for (const std::string& name : problem.profile)
-    if (name != "all" && !known(name)) throw InputError({"--profile", 0}, "no parameter '" + name + "' can be profiled", "wanted one of " + names, "Run files go before the option, or behind another one.");
+    if (name != "all" && !known(name)) throw InputError({"--profile", 0}, "no parameter '" + name + "' can be profiled", "wanted one of " + names, "Or there is no such file: run files may stand behind the option.");
 }
 
 }  // namespace

@@ -36,7 +36,10 @@ int fit_command(int argc, char** argv) {
     app.parse(argc, argv);
     std::erase_if(problem.profile, [](const std::string& name) { return name.empty() || name == "{}"; });  // how CLI11 says that nothing follows
     // Runs behind `--profile`.
-    const auto files = std::stable_partition(problem.profile.begin(), problem.profile.end(), [](const std::string& name) { return !std::filesystem::exists(name); });
+    const auto files = std::stable_partition(problem.profile.begin(), problem.profile.end(), [](const std::string& name) {
+      std::error_code none;
+      return name == "all" || !std::filesystem::is_regular_file(name, none);
+    });
     run_paths.insert(run_paths.end(), files, problem.profile.end());
     problem.profile.erase(files, problem.profile.end());
     if (run_paths.empty()) throw CLI::RequiredError("runs");

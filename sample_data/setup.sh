@@ -42,8 +42,8 @@ else
   echo "This is not Debian, so nothing is installed. Needed are: $packages" >&2
 fi
 
-# A build directory keeps the generator it was made with. UNRIG_WERROR, UNRIG_UNITY and UNRIG_SANITIZE in the environment reach the build.
+# A build directory keeps the generator it was made with. UNRIG_WERROR and UNRIG_SANITIZE in the environment reach the build.
 generator=
 [ -f build/CMakeCache.txt ] || generator="-G Ninja"
 # shellcheck disable=SC2086
-cmake -S . -B build --log-level=WARNING $generator ${UNRIG_WERROR:+-DUNRIG_WERROR="$UNRIG_WERROR"} ${UNRIG_UNITY:+-DUNRIG_UNITY="$UNRIG_UNITY"} ${UNRIG_SANITIZE:+-DUNRIG_SANITIZE="$UNRIG_SANITIZE"}
+cmake -S . -B build --log-level=WARNING $generator ${UNRIG_WERROR:+-DUNRIG_WERROR="$UNRIG_WERROR"} ${UNRIG_SANITIZE:+-DUNRIG_SANITIZE="$UNRIG_SANITIZE"}

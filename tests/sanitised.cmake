@@ -65,6 +65,7 @@ if(NOT UNRIG_SANITIZE STREQUAL "ALL")  # ten seconds and more each, half an hour
     Trial.NothingHiddenAndAWave Trial.WhatIsHiddenOutsideTheCandidatesCannotBeNamed OpenQuestion.AFitOfOneModeBendsItsParametersToIt
     In/DryFriction.IsTakenOutOfTheLoad/* Given/KnownAmplifier.IsUndone/* LawSteps.OfAFitRefineTheLoadAsTheirSquareAndWithinItsBand
     RunInLegs.TakeRestsForWhatTheyAre RunInLegs.ACalibrationErrorScalesTheLoad RunInLegs.AreForLinearRigs RunInLegs.FollowStepsThatTheKnotsCannotFollow Restless.AnErrorOfTheRigMovesTheLoadAsItsColumnSays Restless.LoadIsFoundInTimeThatGoesWithTheRecord
+    Restless.ALongSineDoesNotBendTheSlope Restless.GapsWidenTheBandAndNothingElse
     Restless.APlaceThatIsRougherThanTheRestIsNamed Report.ADiagnosisShowsItsRecordingsAndBothModels ReportInABrowser.LoadsDrawsAndZooms)
 endif()
 list(JOIN left_out ":" left_out)

@@ -124,7 +124,7 @@ class UffFile {
     line();  // abscissa
     const std::string_view ordinate = line();
     h.unit = told(field(ordinate, 47, 20));
-    if (node == 0)  // as from amplifiers, which know of no structure
+    if (node == 0 && direction == 0)  // as from amplifiers, which know of no structure
       for (const std::string& called : {told(h.title), told(field(ordinate, 26, 20))})
         if (!called.empty()) h.name = called;
     line();  // denominator
