@@ -77,7 +77,8 @@ Index enough_to_begin_with(const Run& run, std::vector<std::string> channels) {
 Search minimise_with_gaps(RestlessRun& run, const AeroelasticModel& model, const Prior& prior, VectorXd theta, double well, bool learn) {
   constexpr int most = 10;
   constexpr double same = 0.1, slowest = 0.95;  // of chi-square: a third of a standard deviation
-  for (double round = 1, before = INFINITY;; ++round) {
+  double before = INFINITY;
+  for (int round = 1;; ++round) {
     Search search = minimise(searched(run, model, prior), prior, theta, well, learn);
     theta = search.solution.theta;
     const double fall = run.settle_missing(theta), again = std::min(slowest, fall / before);  // each fall this share of the one before

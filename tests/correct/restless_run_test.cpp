@@ -44,6 +44,15 @@ double chirp(double t) {
   return 2 * soft((t - 0.2) / 0.3) * std::sin(2 * pi * first * duration / growth * std::expm1((t - 0.2) / duration * growth));
 }
 
+/// Derivative of a function of theta with respect to theta_j, by the central difference over steps of 1e-4 of it.
+template <class F>
+double difference(const F& f, const VectorXd& theta, Index j) {
+  const double h = 1e-4 * std::abs(theta[j]);
+  VectorXd up = theta, down = theta;
+  up[j] += h, down[j] -= h;
+  return (f(up) - f(down)) / (2 * h);
+}
+
 TEST(RestlessRun, SlopesOfChiSquareAreItsDifferences) {
   const Recorded r = record(&many_frequencies, 1200);
   const AeroelasticModel model = free_circulation();
@@ -57,12 +66,9 @@ TEST(RestlessRun, SlopesOfChiSquareAreItsDifferences) {
   const VectorXd gradient = 2 * e.jacobian.transpose() * e.residual;
   for (const std::string name : {"normal_force_slope", "normal.stiffness_scale", "apparent_mass_coefficient", "circulation.amplitude[3]"}) {
     const Index j = model.index(name);
-    const double h = 1e-4 * std::abs(theta[j]);
-    VectorXd up = theta, down = theta;
-    up[j] += h, down[j] -= h;
-    const double difference = (run.solve(up).chi2 - run.solve(down).chi2) / (2 * h);
+    const double expected = difference([&](const VectorXd& at) { return run.solve(at).chi2; }, theta, j);
     // Beside truncation, h^2: the uncertainty of the first state depends on theta, which the slope leaves out; 4e-3 measured in so short a record.
-    EXPECT_NEAR(gradient[j], difference, 0.01 * std::abs(difference)) << name << " off by " << gradient[j] / difference - 1;
+    EXPECT_NEAR(gradient[j], expected, 0.01 * std::abs(expected)) << name << " off by " << gradient[j] / expected - 1;
   }
 }
 
@@ -76,17 +82,14 @@ TEST(RestlessRun, FreedomOfTheMotionIsThatOfTheSmoother) {
   const RestlessRun::Point point = run.at(theta);
   double freedom = 0;
   for (Index c = 0; c <= run.outputs(); ++c) freedom += 1200 * point.smoother->variance(point.smoother->filter().C.row(c))[600] / std::pow(run.sigma()[c], 2);
-  EXPECT_NEAR(point.freedom, freedom, 1e-3 * freedom);  // at its middle the record still knows of its ends
+  EXPECT_NEAR(point.freedom, freedom, 1e-3 * freedom);  // at its middle the record still knows of its ends: 4e-5 measured
 
   const std::vector<Index> moved = {model.index("normal_force_slope"), model.index("normal.stiffness_scale"), model.index("apparent_mass_coefficient"), model.index("circulation.amplitude[3]")};
   VectorXd slopes(4);
   run.slopes(point, run.motion(point), moved, {}, [&](Index place, const RestlessRun::Slope& s) { slopes[place] = s.freedom; });
   for (std::size_t i = 0; i < moved.size(); ++i) {
-    const double h = 1e-4 * std::abs(theta[moved[i]]);
-    VectorXd up = theta, down = theta;
-    up[moved[i]] += h, down[moved[i]] -= h;
-    const double difference = (run.at(up).freedom - run.at(down).freedom) / (2 * h);
-    EXPECT_NEAR(slopes[static_cast<Index>(i)], difference, 1e-4 * std::abs(difference));
+    const double expected = difference([&](const VectorXd& at) { return run.at(at).freedom; }, theta, moved[i]);
+    EXPECT_NEAR(slopes[static_cast<Index>(i)], expected, 1e-4 * std::abs(expected));  // the step's square is 1e-8
   }
 }
 
@@ -101,7 +104,7 @@ TEST(RestlessRun, MissingSamplesSettle) {
   const double on_a_straight_line = run.solve(theta).chi2, fall = run.settle_missing(theta);
   EXPECT_GT(fall, 100);
   EXPECT_NEAR(run.solve(theta).chi2, on_a_straight_line - fall, 1e-6 * on_a_straight_line) << "as conjugate gradients say";
-  EXPECT_LT(run.settle_missing(theta), 0.05);
+  EXPECT_LT(run.settle_missing(theta), 1e-3) << "what counts as little";
 }
 
 /// What a piece begins with is handed on to it, slow lags and all: the same numbers as from the record in one piece.
@@ -135,7 +138,6 @@ TEST(RestlessRun, PiecesMakeTheWholeRecord) {
   EXPECT_LT((ratio * ratio.transpose() - Eigen::MatrixXd::Identity(theta.size(), theta.size())).cwiseAbs().maxCoeff(), 1e-3);
 }
 
-/// The settled filter is for linear rigs, and 400 knots do not follow such a motion: it must say so, and what to do.
 // Where the section moves with negative damping no record like this one exists; the responses that slopes are made of would overflow over a long one.
 TEST(RestlessRun, ARigThatWouldFlutterIsNoCandidate) {
   const Recorded r = record(many_frequencies, 2000);
@@ -147,6 +149,7 @@ TEST(RestlessRun, ARigThatWouldFlutterIsNoCandidate) {
   EXPECT_TRUE(std::isinf(run.solve(theta).chi2));
 }
 
+/// The settled filter is for linear rigs, and 400 knots do not follow such a motion: it must say so, and what to do.
 TEST(Restless, ANonlinearForceIsRefusedWithAdvice) {
   const Recorded r = record(&sine, 10000);
   try {
@@ -230,23 +233,23 @@ TEST(Restless, GapsWidenTheBandAndNothingElse) {
   for (const char* channel : {"alpha", "gauge"}) channel_of(r.run, channel).segment(4000, 60).setConstant(std::nan(""));
   const CorrectResult result = correct({test::null_rig(), test::null_fit(), r.run, 0});
   EXPECT_THAT(result.warnings, ElementsAre(HasSubstr("1000 samples are missing from 2 s on")));
-  EXPECT_NEAR(result.reduced_chi2, whole.reduced_chi2, 0.03);  // of as many readings, but for a tenth: 0.012 measured
+  EXPECT_NEAR(result.reduced_chi2, whole.reduced_chi2, 0.03);  // its own scatter is 0.013
   EXPECT_NEAR(result.slope, slope, 3 * result.slope_std);
   EXPECT_NEAR(result.slope_std, whole.slope_std, 0.1 * whole.slope_std);
   const VectorXd off = (result.circulatory.value - r.circulatory).cwiseQuotient(result.circulatory.std);
   EXPECT_LT(off.cwiseAbs().maxCoeff(), result.circulatory.simultaneous);
-  EXPECT_LT(rms(off), 1.15);  // 0.97 measured
+  EXPECT_LT(rms(off), 1.15);  // 0.92 measured
   const VectorXd wider = result.circulatory.std.cwiseQuotient(whole.circulatory.std);
   EXPECT_NEAR(wider[2600], 1, 0.03) << "far from gaps";
-  EXPECT_GT(wider[1500], 1.3) << "the angle alone says less";  // 2.0 measured
-  EXPECT_GT(wider[4030], 1.3) << "nothing is read there";  // 1.56 measured
+  EXPECT_GT(wider[1500], 1.3) << "the angle alone says less";  // 1.70 measured
+  EXPECT_GT(wider[4030], 1.3) << "nothing is read there";  // 1.54 measured
   // Over a quarter of the slowest period: what the shaft does there remains a guess, but the rest of the record does not suffer.
   for (const char* channel : {"alpha", "gauge"}) channel_of(r.run, channel).segment(4000, 300).setConstant(std::nan(""));
   const CorrectResult longer = correct({test::null_rig(), test::null_fit(), r.run, 0});
   EXPECT_NEAR(longer.slope, slope, 3 * longer.slope_std);
   const VectorXd still_off = (longer.circulatory.value - r.circulatory).cwiseQuotient(longer.circulatory.std);
   EXPECT_LT(std::max(still_off.head(3950).cwiseAbs().maxCoeff(), still_off.tail(1650).cwiseAbs().maxCoeff()), longer.circulatory.simultaneous);
-  EXPECT_GT(longer.circulatory.std[4150], 20 * whole.circulatory.std[4150]);  // 24.5 measured
+  EXPECT_GT(longer.circulatory.std[4150], 20 * whole.circulatory.std[4150]);  // 25.4 measured
 }
 
 TEST(Restless, SourcesAddUpAndACalibrationErrorScalesTheLoad) {
