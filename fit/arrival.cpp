@@ -194,7 +194,7 @@ std::vector<VectorXd> tone_starts(const JointProblem& joint, const Effect& e) {
   constexpr std::size_t most = 3;
   for (const auto& [power, value] : found) {
     p[0] = value;
-    const bool near_another = std::any_of(starts.begin(), starts.end(), [&](const VectorXd& s) { return std::abs(s[0] - value) < 0.05 * value; });
+    const bool near_another = std::any_of(starts.begin(), starts.end(), [value = value](const VectorXd& s) { return std::abs(s[0] - value) < 0.05 * value; });
     if (!near_another) starts.push_back(p);
     if (starts.size() == most) break;
   }

@@ -3,14 +3,14 @@
 # This is the one place that names the Debian packages. With all of them present nothing touches the network.
 #
 #   sh sample_data/setup.sh               what the build needs
-#   sh sample_data/setup.sh --optional    and what only saves time (ccache) or serves comparisons (SciPy) and the look of the report (Chromium)
+#   sh sample_data/setup.sh --optional    and what only saves time (ccache, clang under the sanitizers) or serves comparisons (SciPy) and the look of the report (Chromium)
 set -eu
 cd "$(dirname "$0")/.."
 
 packages="cmake g++ make ninja-build pkg-config
   libeigen3-dev libceres-dev libfftw3-dev libudunits2-dev libtomlplusplus-dev nlohmann-json3-dev libcli11-dev libfmt-dev libfast-float-dev libmatio-dev zlib1g-dev libjs-dygraphs
   libgtest-dev libgmock-dev libbenchmark-dev"
-optional="ccache chromium python3-numpy python3-scipy"
+optional="ccache clang libclang-rt-dev chromium python3-numpy python3-scipy"
 
 case "${1-}" in
   "") ;;

@@ -1,20 +1,30 @@
 #!/bin/sh
 # Every test under AddressSanitizer (with LeakSanitizer) and UBSan; the first finding of either ends the test that met it. The last line is the count.
 #
-#   sh tests/sanitize.sh                       the whole suite, hours
-#   sh tests/sanitize.sh REGEX                 the tests whose names match, as `ctest -R` takes it: sanitised.core, say
-#   UNRIG_SANITIZE=ON sh tests/sanitize.sh     all but the longest (sanitised.cmake has the list), as CI does where there is time
-#   UNRIG_SANITIZE=CORE sh tests/sanitize.sh   those of core and of the readers of files
+#   sh tests/sanitize.sh                                      the whole suite
+#   sh tests/sanitize.sh REGEX                                the tests whose names match, as `ctest -R` takes it: sanitised.core, say
+#   UNRIG_SANITIZED_SECONDS=10 sh tests/sanitize.sh           each for ten seconds at most: one that would take longer is counted as skipped
+#   UNRIG_SANITIZED_UNTIL=$(date -d 20:00 +%s) sh tests/sanitize.sh   each for as long as all have time until then, as CI does
 #
 # CMAKE_BUILD_PARALLEL_LEVEL and CTEST_PARALLEL_LEVEL set how many jobs run at once; otherwise as many as there are processors.
 set -eu
 cd "$(dirname "$0")/.."
-UNRIG_SANITIZE="${UNRIG_SANITIZE:-ALL}" sh sample_data/setup.sh
+UNRIG_SANITIZE=ON sh sample_data/setup.sh
 cmake --build build --parallel "${CMAKE_BUILD_PARALLEL_LEVEL:-$(nproc)}"
+export CTEST_PARALLEL_LEVEL="${CTEST_PARALLEL_LEVEL:-$(nproc)}"
+
+if [ -n "${UNRIG_SANITIZED_UNTIL-}" ]; then
+  # Processor seconds, measured: all tests but the sixty longest take some 150, and what is left is divided among these.
+  left=$(((UNRIG_SANITIZED_UNTIL - $(date +%s)) * CTEST_PARALLEL_LEVEL))
+  UNRIG_SANITIZED_SECONDS=$(((left - 150) / 60))
+  [ "$UNRIG_SANITIZED_SECONDS" -ge 2 ] || UNRIG_SANITIZED_SECONDS=2
+  export UNRIG_SANITIZED_SECONDS
+  echo "Each test for $UNRIG_SANITIZED_SECONDS s at most."
+fi
 
 report=build/sanitised_results.xml
 rm -f "$report"
 status=0
-CTEST_PARALLEL_LEVEL="${CTEST_PARALLEL_LEVEL:-$(nproc)}" ctest --test-dir build --output-on-failure --no-tests=error -R "${1-^sanitised\\.}" --output-junit sanitised_results.xml || status=$?
+ctest --test-dir build --output-on-failure --no-tests=error -R "${1-^sanitised\\.}" --output-junit sanitised_results.xml || status=$?
 sh tests/count.sh "$report"
 exit "$status"

@@ -185,12 +185,12 @@ DiagnosedTrace read_trace(const json& t, const std::string& unit) {
 void add_diagnosed_traces(ReportPage& page, const DiagnosedTrace& trace, const std::string& file) {
   const auto& [channel, unit, time, measured, before, after, force, force_std] = trace;
   const std::string of = channel.empty() ? "" : channel + ": ";
-  const auto fits = [&](const VectorXd& x) { return x.size() == time.size() && time.size() > 1; };
+  const auto fits = [&time = time](const VectorXd& x) { return x.size() == time.size() && time.size() > 1; };
   if (!fits(measured)) return;
   Plot records{of + "recording and models", "time [s]", labelled("reading", unit), time, {{"recording", 0, measured}}, file};
   Plot left{of + "residuals", "time [s]", labelled("recording − model", unit), time, {}, file};
   left.height = 200;
-  const auto add = [&](const char* name, int colour, const VectorXd& model, bool dashed) {
+  const auto add = [&, &measured = measured](const char* name, int colour, const VectorXd& model, bool dashed) {
     if (!fits(model)) return;
     records.curves.push_back({fmt::format("model {}", name), colour, model, {}, dashed});
     left.curves.push_back({fmt::format("residual {}", name), colour, measured - model});
