@@ -1,7 +1,12 @@
 # AddressSanitizer (with LeakSanitizer) and UBSan under the same tests: the floors are compiled once more with them, and the tests' objects are linked to these.
 # Ten files are compiled as one, which takes half the time, and by clang where it is there, which takes half of that and makes the tests run faster.
+set(compiled_by_clang CXX_EXTENSIONS OFF)  # as everywhere
 find_program(UNRIG_CLANG clang++)
 if(UNRIG_CLANG)
+  file(CONFIGURE OUTPUT nothing.cpp CONTENT "int main() {}\n")
+  execute_process(COMMAND ${UNRIG_CLANG} -fsanitize=address,undefined ${CMAKE_CURRENT_BINARY_DIR}/nothing.cpp -o ${CMAKE_CURRENT_BINARY_DIR}/nothing RESULT_VARIABLE without_runtime ERROR_QUIET)
+endif()
+if(UNRIG_CLANG AND NOT without_runtime)
   set(by_clang ${CMAKE_CURRENT_BINARY_DIR}/by_clang.sh)
   set(ccache ${CCACHE_PROGRAM})
   file(CONFIGURE OUTPUT ${by_clang} CONTENT "#!/bin/sh\n# In place of the compiler, which is the first word.\nshift\nexec @ccache@ @UNRIG_CLANG@ \"$@\"\n" @ONLY)
@@ -83,6 +88,16 @@ foreach(folder core fit correct verification commands)
 endforeach()
 add_dependencies(sanitised_test_commands sanitised_unrig)
 
+foreach(study coverage basin correct effects)
+  add_executable(sanitised_${study}_study $<TARGET_OBJECTS:sanitised_correct> $<TARGET_OBJECTS:sanitised_fit> $<TARGET_OBJECTS:sanitised_core>
+    $<TARGET_OBJECTS:${study}_study_objects> $<TARGET_OBJECTS:unrig_study_parts>)
+  target_link_libraries(sanitised_${study}_study PRIVATE sanitised_correct unrig_test_support Threads::Threads)
+  set_target_properties(sanitised_${study}_study PROPERTIES CROSSCOMPILING_EMULATOR "${in_this_environment}" ${compiled_by_clang})
+  add_test(NAME sanitised.studies.${study} COMMAND sanitised_${study}_study ${${study}_study_arguments})
+  list(FIND from_short_to_long studies cost)
+  set_tests_properties(sanitised.studies.${study} PROPERTIES SKIP_REGULAR_EXPRESSION "\\[  SKIPPED \\]" TIMEOUT 9000 COST ${cost})
+endforeach()
+
 # The readers of files on the corpora of their fuzzers (fuzz/README.md).
 add_library(unrig_replay OBJECT fuzz/replay.cpp)
 set_target_properties(unrig_replay PROPERTIES ${compiled_by_clang})
@@ -92,4 +107,5 @@ foreach(reader run rig tdms uff mat)
   target_link_libraries(replay_${reader} PRIVATE unrig_replay)
   set_target_properties(replay_${reader} PROPERTIES CROSSCOMPILING_EMULATOR "${in_this_environment}" ${compiled_by_clang})
   add_test(NAME sanitised.corpus.${reader} COMMAND replay_${reader} ${CMAKE_CURRENT_SOURCE_DIR}/fuzz/corpus/${reader})
+  set_tests_properties(sanitised.corpus.${reader} PROPERTIES SKIP_REGULAR_EXPRESSION "\\[  SKIPPED \\]" TIMEOUT 9000)
 endforeach()
