@@ -194,24 +194,15 @@ VectorXd between(const VectorXd& value, const std::vector<Index>& at, double lea
   return all;
 }
 
-/// Covariance of the errors of neighbouring samples over their variance, far from the ends and for given z: the error's spectrum is |l|^2 / (|g|^2 / r + |a|^2 / r_a + |1 - e^-iw|^8 / tau^2), with
-/// l, g and a what a spline does to the load, the readings and the angle.
+/// Covariance of the errors of neighbouring samples over their variance, far from the ends and for given z: the error's spectrum is |l|^2 over the precision of a spline's coefficient, with l what
+/// a spline does to the load.
 double neighbours_alike(const RestlessRun& run, const RestlessRun::Point& point, Index load) {
-  const Index outputs = run.outputs();
   const Convolution& convolution = point.smoother->convolution();
-  const VectorXd none = VectorXd::Zero(convolution.far());  // what is left of a spline behind that is the same for neighbours
   const Response spline = spline_response(point.system, exact_step(point.system, run.dt()), convolution.near(), {});
-  const auto power_of = [&](Index output) -> VectorXd { return convolution.kernel(spline.output.col(output), none).fine.cwiseAbs2(); };
-  const double tau = run.roughness() * run.sigma()[outputs];
-  VectorXd power = power_of(outputs + load), beside(power.size());
-  VectorXd information = VectorXd::Zero(power.size());
-  for (Index c = 0; c < outputs; ++c) information += power_of(c) / std::pow(run.sigma()[c], 2);
-  for (Index k = 0; k < power.size(); ++k) {
-    const double w = 2 * std::acos(-1.0) * static_cast<double>(k) / static_cast<double>(convolution.length());
-    const double angle = (4 + 2 * std::cos(w)) / 6;
-    power[k] /= information[k] + std::pow(angle / run.sigma()[outputs], 2) + std::pow(2 - 2 * std::cos(w), 4) / (tau * tau);
-    beside[k] = power[k] * std::cos(w);
-  }
+  const VectorXd none = VectorXd::Zero(convolution.far());  // what is left of a spline behind that is the same for neighbours
+  const VectorXd power = convolution.kernel(spline.output.col(run.outputs() + load), none).fine.cwiseAbs2().cwiseQuotient(point.precision);
+  VectorXd beside(power.size());
+  for (Index k = 0; k < power.size(); ++k) beside[k] = power[k] * std::cos(2 * std::acos(-1.0) * static_cast<double>(k) / static_cast<double>(convolution.length()));
   return convolution.mean(beside) / convolution.mean(power);
 }
 

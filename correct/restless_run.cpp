@@ -187,12 +187,14 @@ void RestlessRun::set_freedom(Point& point, const ExactStep& step) const {
     if (c == 0) point.frees.resize(line.size(), outputs());
     point.frees.col(c) = line.conjugate() / std::pow(sigma_[c], 2);
   }
+  point.precision.resize(point.frees.rows());
   VectorXd smooth(point.frees.rows());  // Pi / D
   for (Index k = 0; k < smooth.size(); ++k) {
     const double w = 2 * std::acos(-1.0) * static_cast<double>(k) / static_cast<double>(convolution.length());
     const double pi = std::pow(2 - 2 * std::cos(w), 4) / (tau * tau), information = point.frees.row(k).cwiseAbs2() * sigma_.head(outputs()).cwiseAbs2() + std::pow((4 + 2 * std::cos(w)) / (6 * sigma_[angle]), 2);
-    smooth[k] = pi / (information + pi);
-    point.frees.row(k) *= 2 * static_cast<double>(whole_) * smooth[k] / (information + pi);
+    point.precision[k] = information + pi;
+    smooth[k] = pi / point.precision[k];
+    point.frees.row(k) *= 2 * static_cast<double>(whole_) * smooth[k] / point.precision[k];
   }
   point.freedom = static_cast<double>(whole_) * (1 - convolution.mean(smooth));
 }
@@ -337,9 +339,9 @@ RunResidual::Evaluation RestlessRun::differentiate(const RunResidual::Solution& 
   e.linear = point.linear;
   e.linear_factor = point.linear_factor;
 
-  // Innovations of the slopes beside what the linear unknowns reach: `rows` those looked at, `downhill` what they have in common with what is left of the readings.
+  // Innovations of the slopes beside what the linear unknowns reach: `rows` those looked at, `half_gradient` what they have in common with what is left of the readings, and half the slope of the freedom.
   MatrixXd rows(some * channels, chosen), along(unknowns, chosen);
-  VectorXd downhill(chosen);
+  VectorXd half_gradient(chosen);
   slopes(point, motion(point), parameters, {}, [&](Index place, const Slope& slope) {
     MatrixXd white = point.smoother->innovations(slope.readings);
     Eigen::Map<VectorXd> all(white.data(), white.size());
@@ -347,14 +349,14 @@ RunResidual::Evaluation RestlessRun::differentiate(const RunResidual::Solution& 
     all = -all;
     all.noalias() -= point.white_columns * reached;
     along.col(place) = reached;
-    downhill[place] = all.dot(flat(point.white)) + slope.freedom / 2;
+    half_gradient[place] = all.dot(flat(point.white)) + slope.freedom / 2;
     for (Index c = 0; c < channels; ++c) rows.col(place).segment(c * some, some) = root.cwiseProduct(white.col(c)(looked_at.at));
   });
   e.linear_slope = MatrixXd::Zero(unknowns, count);
   e.linear_slope(Eigen::all, parameters) = along;
   const MatrixXd triangle = triangle_of(std::move(rows));
   e.residual.resize(chosen + 1);
-  e.residual.head(chosen) = solve_below(triangle, downhill);
+  e.residual.head(chosen) = solve_below(triangle, half_gradient);
   e.residual[chosen] = std::sqrt(std::max(0.0, e.chi2 - e.residual.head(chosen).squaredNorm()));
   e.jacobian = MatrixXd::Zero(chosen + 1, count);
   e.jacobian.topRows(chosen)(Eigen::all, parameters) = triangle;

@@ -72,7 +72,8 @@ class RestlessRun {
     Eigen::MatrixXd left;                  ///< readings without what they reach, samples x channels
     Eigen::MatrixXd white;                 ///< innovations of that
     double chi2 = 0, log_determinant = 0;
-    double freedom = 0;                    ///< of the motion
+    Eigen::VectorXd precision;             ///< of a spline's coefficient far from the ends, by lines of the spectrum: |G|^2 / r + |A|^2 / r_a + Pi, Pi = |1 - e^-iw|^8 / tau^2
+    double freedom = 0;                    ///< of the motion: samples times the mean of 1 - Pi / precision
     Eigen::MatrixXcd frees;                ///< lines of the spectrum x outputs: times what a spline does to them by a parameter, summed over both, what that parameter does to the freedom
     double objective() const { return chi2 + freedom; }
   };
