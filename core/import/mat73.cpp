@@ -3,13 +3,18 @@
 #include <fmt/format.h>
 #include <matio.h>
 #include <sys/mman.h>
+#include <sys/prctl.h>
+#include <sys/resource.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
 #include <algorithm>
 #include <cerrno>
+#include <csignal>
+#include <cstdint>
 #include <cstring>
 #include <filesystem>
+#include <fstream>
 #include <memory>
 #include <optional>
 #include <stdexcept>
@@ -156,6 +161,22 @@ Recording unpacked(const std::string& bytes, const std::string& path) {
 
 enum ChildStatus { child_done = 0, child_no_file = 3 };
 
+/// Ends this process with its parent, and where it takes more memory or time than a file of this size can need: a damaged one can ask for any.
+void limit(std::uintmax_t file_size) {
+  constexpr std::uintmax_t base = 1u << 30, packed_at_most = 50;  // bytes of memory; deflate packs recorded numbers to a twentieth at best
+  constexpr std::uintmax_t seconds = 5, bytes_a_second = 2u << 20;  // of processor time
+  ::prctl(PR_SET_PDEATHSIG, SIGKILL);
+  std::uintmax_t pages = 0;  // a sanitizer's shadow is address space too
+  std::ifstream("/proc/self/statm") >> pages;
+  const auto most = [](int what, std::uintmax_t value) {
+    const rlimit both{value, value};
+    ::setrlimit(static_cast<__rlimit_resource>(what), &both);
+  };
+  most(RLIMIT_AS, pages * static_cast<std::uintmax_t>(::sysconf(_SC_PAGESIZE)) + base + packed_at_most * file_size);
+  most(RLIMIT_CPU, seconds + file_size / bytes_a_second);
+  most(RLIMIT_CORE, 0);
+}
+
 }  // namespace
 
 Recording read_mat73(const std::string& path) {
@@ -171,6 +192,9 @@ Recording read_mat73(const std::string& path) {
   if (child == 0) {
     int status = 1;
     try {
+      std::error_code ignored;  // what cannot be read is found out below
+      const std::uintmax_t size = std::filesystem::file_size(path, ignored);
+      limit(ignored ? 0 : size);
       const std::optional<Recording> found = read_here(path);
       if (found) write_text(handed, packed(*found));
       status = found ? child_done : child_no_file;

@@ -80,6 +80,15 @@ TEST(ImportCommand, SurvivesAFileAtWhichHdf5BreaksDown) {
   }
 }
 
+/// Found by tests/fuzz/mutate.py: the 40 samples of its gauge claim to be more than any memory holds.
+TEST(ImportCommand, LeavesOutWhatAsksForAllMemory) {
+  const TemporaryDirectory directory;
+  const Finished finished = run_unrig(directory, {"import", test::source_path("tests/fuzz/corpus/mat73/asks_for_all_memory.mat"), "--list"});
+  EXPECT_EQ(finished.status, 0) << finished.err;
+  EXPECT_THAT(finished.err, HasSubstr("the variable gauge is left out"));
+  EXPECT_THAT(finished.out, AllOf(HasSubstr("time"), Not(HasSubstr("gauge"))));
+}
+
 TEST(ImportCommand, RefusesAndLeavesNothingBehind) {
   const TemporaryDirectory directory;
   const std::string mapping = directory.file("map.toml", map + "F\"\nunit = \"N\"\n");
