@@ -7,98 +7,109 @@
 #include <fmt/format.h>
 
 #include "core/error.h"
+#include "core/import/number_form.h"
+#include "core/import/table_cells.h"
 #include "core/scan.h"
 
 namespace unrig {
 namespace {
 
-std::vector<std::string_view> cells_of(std::string_view line, const std::string& delimiter) {
-  std::vector<std::string_view> cells;
-  if (delimiter == "blanks") {
-    for (std::size_t at = line.find_first_not_of(" \t"); at != std::string_view::npos; at = line.find_first_not_of(" \t", at)) {
-      const std::size_t end = std::min(line.find_first_of(" \t", at), line.size());
-      cells.push_back(line.substr(at, end - at));
-      at = end;
-    }
-    return cells;
-  }
-  for (std::size_t at = 0;;) {
-    const std::size_t quoted = at < line.size() && line[at] == '"' ? line.find('"', at + 1) : at;
-    const std::size_t end = std::min(line.find(delimiter, quoted == std::string_view::npos ? at : quoted), line.size());
-    std::string_view cell = trimmed(line.substr(at, end - at));
-    if (cell.size() >= 2 && cell.front() == '"' && cell.back() == '"') cell = cell.substr(1, cell.size() - 2);
-    cells.push_back(cell);
-    if (end == line.size()) return cells;
-    at = end + delimiter.size();
-  }
-}
-
-std::string delimiter_in(std::string_view line, const std::string& decimal) {
-  const auto count = [&](char c) { return std::count(line.begin(), line.end(), c); };
-  for (const char c : {'\t', ';'})
-    if (count(c) > 0) return std::string(1, c);
-  if (decimal != "," && count(',') > 0) return ",";
-  return "blanks";
-}
-
 /// "Force [N]" or "Force (N)" -> name and unit.
 RecordedChannel named(std::string_view cell) {
-  RecordedChannel channel{std::string(cell), "", {}, "", 0, 0};
+  RecordedChannel channel{unescaped(cell), "", {}, "", 0, 0};
   for (const auto& [open, close] : {std::pair{'[', ']'}, std::pair{'(', ')'}}) {
     const std::size_t at = cell.rfind(open);
     if (at == std::string_view::npos || at == 0 || cell.back() != close) continue;
-    channel.name = trimmed(cell.substr(0, at));
+    channel.name = unescaped(trimmed(cell.substr(0, at)));
     channel.unit = trimmed(cell.substr(at + 1, cell.size() - at - 2));
     break;
   }
   return channel;
 }
 
+/// The lines of a text one by one.
+struct Lines {
+  std::string_view text;
+  char end = '\n';
+  int line = 0;
+  std::string_view remark{};  ///< the last one
+
+  bool next(std::string_view& out, bool skip_remarks = true) {
+    while (!text.empty()) {
+      const std::size_t length = text.find(end);
+      out = text.substr(0, length);
+      text.remove_prefix(length == std::string_view::npos ? text.size() : length + 1);
+      ++line;
+      if (out.ends_with('\r')) out.remove_suffix(1);
+      const std::string_view content = trimmed(out);
+      const bool is_remark = !content.empty() && (content.front() == '#' || content.front() == '%');
+      if (!skip_remarks || !(content.empty() || is_remark)) return true;
+      if (is_remark) remark = out;
+    }
+    return false;
+  }
+};
+
 class Table {
  public:
-  Table(std::string_view text, const std::string& file, const DelimitedFormat& format) : text_(text), format_(format), out_{file, "text", {}, {}} {}
+  Table(std::string_view text, const std::string& file, const DelimitedFormat& format) : lines_{text}, format_(format), out_{file, "text", {}, {}} {}
 
   Recording read() {
-    if (text_.starts_with("\xEF\xBB\xBF")) text_.remove_prefix(3);
+    if (lines_.text.starts_with("\xEF\xBB\xBF")) lines_.text.remove_prefix(3);
+    if (lines_.text.find('\n') == std::string_view::npos) lines_.end = '\r';  // as old Macintosh programs write
     std::string_view line;
     for (int i = 0; i < format_.skip_lines; ++i)
-      if (!next(line, false)) refuse(fmt::format("the file ends within the {} lines to skip", format_.skip_lines), "wanted a table behind them", "");
-    if (!next(line, true)) refuse("the file holds no table", "wanted rows of numbers", "");
-    if (format_.delimiter.empty()) format_.delimiter = delimiter_in(line, format_.decimal);
+      if (!lines_.next(line, false)) refuse(fmt::format("the file ends within the {} lines to skip", format_.skip_lines), "wanted a table behind them", "");
+    const Lines from_here = lines_;
+    if (!lines_.next(line)) refuse("the file holds no table", "wanted rows of numbers", "");
+    if (format_.delimiter.empty()) format_.delimiter = delimiter_in(line);
+    find_number_form(from_here);
     const bool header = format_.header.value_or(!all_numbers(line));
     if (header) {
       name_columns(cells_of(line, format_.delimiter));
-      if (next(line, true) && !units_row(line)) row(line);
+      if (lines_.next(line) && !units_row(line)) row(line);
     } else {
       const std::size_t columns = cells_of(line, format_.delimiter).size();
-      std::string_view remark = trimmed(remark_);
+      std::string_view remark = trimmed(lines_.remark);
       remark.remove_prefix(std::min(remark.find_first_not_of("#%"), remark.size()));
       const std::vector<std::string_view> names = cells_of(trimmed(remark), format_.delimiter);
       if (columns > 1 && names.size() == columns) name_columns(names);
       else for (std::size_t c = 0; c < columns; ++c) out_.channels.push_back({fmt::format("{}", c + 1), "", {}, "", 0, 0});
       row(line);
     }
-    while (next(line, true)) row(line);
+    while (lines_.next(line)) row(line);
     if (out_.channels.empty() || out_.channels.front().value.empty()) refuse("the table has no rows", "wanted rows of numbers", "");
     return std::move(out_);
   }
 
  private:
-  [[noreturn]] void refuse(const std::string& found, const std::string& wanted, const std::string& advice) const { throw InputError({out_.file, line_}, found, wanted, advice); }
+  [[noreturn]] void refuse(const std::string& found, const std::string& wanted, const std::string& advice) const { throw InputError({out_.file, lines_.line}, found, wanted, advice); }
 
-  bool next(std::string_view& line, bool skip_remarks) {
-    while (!text_.empty()) {
-      const std::size_t end = text_.find('\n');
-      line = text_.substr(0, end);
-      text_.remove_prefix(end == std::string_view::npos ? text_.size() : end + 1);
-      ++line_;
-      if (line.ends_with('\r')) line.remove_suffix(1);
-      const std::string_view content = trimmed(line);
-      const bool is_remark = !content.empty() && (content.front() == '#' || content.front() == '%');
-      if (!skip_remarks || !(content.empty() || is_remark)) return true;
-      if (is_remark) remark_ = line;
+  /// What the format says, else what all cells from the first row on show.
+  void find_number_form(Lines lines) {
+    if (!format_.thousands.empty()) form_.thousands = format_.thousands.front();
+    if (!format_.decimal.empty()) form_.decimal = format_.decimal.front();
+    else if (form_.thousands == '.') form_.decimal = ',';
+    else if (form_.thousands != ',' && format_.delimiter != "," && shows_commas(lines)) {
+      form_.decimal = ',';
+      out_.format = "text; no number has a point, so commas are taken for the decimal sign";
     }
-    return false;
+    const bool twice = format_.delimiter == "," && (form_.decimal == ',' || form_.thousands == ',');
+    if (twice && lines.text.find('"') == std::string_view::npos)
+      refuse("commas stand between the cells and within numbers, and no cell is quoted", "wanted another delimiter, or numbers in quotes", "The mapping's [format] names delimiter, decimal and thousands.");
+    if (format_.delimiter == "blanks" && form_.thousands == ' ')
+      refuse("blanks stand between the cells and within numbers", "wanted another delimiter", "The mapping's [format] names delimiter, decimal and thousands.");
+  }
+
+  bool shows_commas(Lines lines) const {
+    if (lines.text.find(',') == std::string_view::npos) return false;
+    DecimalSign sign;
+    std::vector<std::string_view> cells;
+    for (std::string_view line; !sign.is_point() && lines.next(line);) {
+      split_cells(line, format_.delimiter, cells);
+      for (const std::string_view cell : cells) sign.see(cell);
+    }
+    return sign.is_comma();
   }
 
   void name_columns(const std::vector<std::string_view>& cells) {
@@ -106,12 +117,7 @@ class Table {
     if (out_.channels.size() > 1 && out_.channels.back().name.empty()) out_.channels.pop_back();  // a delimiter at the end of the row
   }
 
-  bool is_number(std::string_view cell) const {
-    std::string copy(cell);
-    if (format_.decimal == ",") std::replace(copy.begin(), copy.end(), ',', '.');
-    double value = 0;
-    return !copy.empty() && read_number(copy.data(), copy.data() + copy.size(), value) == copy.data() + copy.size();
-  }
+  bool is_number(std::string_view cell) const { return cell_number(cell, form_).has_value(); }
 
   bool all_numbers(std::string_view line) const {
     const std::vector<std::string_view> cells = cells_of(line, format_.delimiter);
@@ -143,17 +149,15 @@ class Table {
 
   double number(std::string_view cell, const std::string& column) const {
     if (cell.empty()) return std::numeric_limits<double>::quiet_NaN();
-    std::string copy(cell);
-    if (format_.decimal == ",") std::replace(copy.begin(), copy.end(), ',', '.');
-    double value = 0;
-    if (read_number(copy.data(), copy.data() + copy.size(), value) != copy.data() + copy.size())
-      refuse(fmt::format("\"{}\" in the column \"{}\" is no number", cell.substr(0, 40), column), "wanted a number", "The mapping's [format] can name delimiter, decimal and skip_lines.");
-    return value;
+    const std::optional<double> value = cell_number(cell, form_);
+    if (value) return *value;
+    const NoNumber no = why_no_number(cell, form_);
+    refuse(fmt::format("{}, in the column \"{}\"", no.why, column), "wanted a number", no.advice);
   }
 
-  std::string_view text_, remark_;  // remark_: the last one
+  Lines lines_;
   DelimitedFormat format_;
-  int line_ = 0;
+  NumberForm form_;
   Recording out_;
 };
 

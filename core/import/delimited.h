@@ -9,15 +9,16 @@ namespace unrig {
 
 /// How a text table is written. What is left empty is found out.
 struct DelimitedFormat {
-  std::string delimiter;      ///< one character, or "blanks" for any number of blanks; empty: what the header row has most of among tab ; , and blanks
-  std::string decimal = ".";  ///< or ","
-  int skip_lines = 0;         ///< before the header, or before the numbers where there is no header
+  std::string delimiter;       ///< one character, or "blanks" for any number of blanks; empty: what the first row has: tab, ; or |, else a comma, else blanks
+  std::string decimal;         ///< "." or ","; empty: a comma where it is no delimiter, numbers have one, none has a point, and not all may be thousands ("1,107")
+  int skip_lines = 0;          ///< before the header, or before the numbers where there is no header
   std::optional<bool> header;  ///< whether a row of names comes first; empty: it does, unless that row holds nothing but numbers
+  std::string thousands{};     ///< what sets off groups of three digits: "." "," " " or "'"; empty: nothing does
 };
 
 /// Reads a table of numbers in text. A header names the columns, with the unit in brackets or parentheses ("Force [N]", "Force (N)") or all units in a row of
 /// their own below it; without one the remark right before the numbers does where it has as many words as they have columns (NumPy writes such), else
-/// they are "1", "2", ... Cells that are empty or nan are missing; lines that begin with # or % are left out.
+/// they are "1", "2", ... Cells that are empty or nan are missing; lines that begin with # or % are left out. Lines end with LF, CR LF, or CR alone.
 /// Throws InputError, with the line, for text where a number should stand, rows of another length than the first, and what has no rows.
 Recording read_delimited(std::string_view text, const std::string& file, const DelimitedFormat& format = {});
 

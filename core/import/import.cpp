@@ -1,6 +1,7 @@
 #include "core/import/import.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <iterator>
 #include <optional>
@@ -161,6 +162,26 @@ std::string head(const TomlTable& mapping, const Recording& recording) {
   return text;
 }
 
+DelimitedFormat read_format(const TomlTable& mapping) {
+  DelimitedFormat format;
+  if (!mapping.has("format")) return format;
+  const TomlTable table = mapping.table("format");
+  table.allow_only({"delimiter", "decimal", "thousands", "skip_lines", "header"});
+  format.delimiter = table.text_or("delimiter", "");
+  if (format.delimiter.size() > 1 && format.delimiter != "blanks") table.fail("delimiter", fmt::format("the delimiter is \"{}\"", format.delimiter), "wanted one character, or \"blanks\"");
+  format.decimal = table.text_or("decimal", "");
+  if (table.has("decimal") && format.decimal != "." && format.decimal != ",") table.fail("decimal", fmt::format("the decimal sign is \"{}\"", format.decimal), "wanted \".\" or \",\"");
+  format.thousands = table.text_or("thousands", "");
+  constexpr std::array signs = {".", ",", " ", "'"};
+  if (table.has("thousands") && std::find(signs.begin(), signs.end(), format.thousands) == signs.end())
+    table.fail("thousands", fmt::format("thousands are set off by \"{}\"", format.thousands), "wanted \".\", \",\", \" \" or \"'\"");
+  if (!format.thousands.empty() && format.thousands == format.decimal) table.fail("thousands", "decimal sign and sign of the thousands are the same", "wanted two different ones");
+  if (table.has("skip_lines")) format.skip_lines = table.integer("skip_lines");
+  if (format.skip_lines < 0) table.fail("skip_lines", fmt::format("skip_lines is {}", format.skip_lines), "wanted zero or more");
+  if (table.has("header")) format.header = table.boolean_or("header", true);
+  return format;
+}
+
 }  // namespace
 
 Imported import_recording(const Recording& recording, const std::string& mapping_text, const std::string& mapping_file) {
@@ -209,19 +230,7 @@ Recording read_recording(const std::string& path, const std::string& mapping_tex
     return read_uff(bytes, path);
   bytes = in_utf8(std::move(bytes));
   if (bytes.find('\0') != std::string::npos) throw InputError({path, 0}, "the file is binary, and in no format that is known here", "wanted TDMS, MATLAB 5 or 7.3, universal file 58, or text", "");
-  DelimitedFormat format;
-  if (mapping.has("format")) {
-    const TomlTable table = mapping.table("format");
-    table.allow_only({"delimiter", "decimal", "skip_lines", "header"});
-    format.delimiter = table.text_or("delimiter", "");
-    if (format.delimiter.size() > 1 && format.delimiter != "blanks") table.fail("delimiter", fmt::format("the delimiter is \"{}\"", format.delimiter), "wanted one character, or \"blanks\"");
-    format.decimal = table.text_or("decimal", ".");
-    if (format.decimal != "." && format.decimal != ",") table.fail("decimal", fmt::format("the decimal sign is \"{}\"", format.decimal), "wanted \".\" or \",\"");
-    if (format.decimal == format.delimiter) table.fail("decimal", "decimal sign and delimiter are the same", "wanted two different ones");
-    if (table.has("skip_lines")) format.skip_lines = table.integer("skip_lines");
-    if (table.has("header")) format.header = table.boolean_or("header", true);
-  }
-  return read_delimited(bytes, path, format);
+  return read_delimited(bytes, path, read_format(mapping));
 }
 
 }  // namespace unrig

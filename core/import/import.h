@@ -24,7 +24,7 @@ namespace unrig {
 ///     bridge.kind = "full-1"      # volts to strain: quarter-1, quarter-2, half-1, half-2, full-1, full-2, full-3 (core/import/bridge.h)
 ///     bridge.gauge_factor = 2.1   # with .poisson, .excitation = "2.5 V", .initial_voltage, .gauge_resistance = "350 ohm", .lead_resistance,
 ///                                 # and .shunt_gain, or .shunt_reading and .shunt_expected (voltages) in its place
-///     [format]                    # of text, where it is not found out: delimiter, decimal, skip_lines, header (core/import/delimited.h)
+///     [format]                    # of text, where it is not found out: delimiter, decimal, thousands, skip_lines, header (core/import/delimited.h)
 ///
 /// Readings that a converter left unscaled are never taken for physical values: without `raw = true` they are an error.
 struct Imported {

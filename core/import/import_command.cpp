@@ -39,7 +39,7 @@ int import_command(int argc, char** argv) {
       "  # bridge.kind = \"full-1\"     # volts to strain: quarter-1, quarter-2, half-1, half-2, full-1, full-2, full-3,\n"
       "  #                            # with bridge.gauge_factor, .poisson, .excitation, .initial_voltage, .gauge_resistance,\n"
       "  #                            # .lead_resistance, .shunt_gain (or .shunt_reading and .shunt_expected)\n"
-      "  # [format]                   # of text, where it is not found out: delimiter = \";\", decimal = \",\", skip_lines = 3, header = false");
+      "  # [format]                   # of text, where it is not found out: delimiter = \";\", decimal = \",\", thousands = \".\",\n  #                            # skip_lines = 3, header = false");
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& e) {
@@ -62,7 +62,7 @@ int import_command(int argc, char** argv) {
   write_text(output, imported.text);
   progress.clear();
   for (const std::string& warning : imported.warnings) warn(warning);
-  fmt::print("{}: {} samples\n", output, imported.samples);
+  fmt::print("{}: {} samples from {} ({})\n", output, imported.samples, recording.file, recording.format);
   for (const std::string& column : imported.columns) fmt::print("  {}\n", column);
   return exit_done;
 }

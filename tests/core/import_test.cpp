@@ -8,6 +8,7 @@
 
 #include <cmath>
 #include <map>
+#include <tuple>
 
 #include "core/error.h"
 #include "core/import/delimited.h"
@@ -146,7 +147,80 @@ TEST(Delimited, RefusesWhatIsNoTable) {
   EXPECT_THAT(complaint([] { read_delimited("a,b\n1,two\n", "f"); }), HasSubstr("\"two\""));
   EXPECT_THAT(complaint([] { read_delimited("a,b\ns,N\n1,2\nx,y\n", "f"); }), HasSubstr("\"x\""));
   EXPECT_THAT(complaint([] { read_delimited("a [s],b\ns,N\n1,2\n", "f"); }), HasSubstr("\"s\"")) << "units twice";
-  EXPECT_THAT(complaint([] { read_delimited("a;b\n1,5;2\n", "f"); }), HasSubstr("decimal"));
+}
+
+DelimitedFormat with_signs(const std::string& decimal, const std::string& thousands = "") {
+  DelimitedFormat format;
+  format.decimal = decimal;
+  format.thousands = thousands;
+  return format;
+}
+
+double number_in(const std::string& cell, const DelimitedFormat& format) { return read_delimited("a;b\n0;" + cell + "\n", "f", format).channels.at(1).value.at(0); }
+std::string refusal(const std::string& cell, const DelimitedFormat& format) {
+  return complaint([&] { number_in(cell, format); });
+}
+
+TEST(Delimited, NeverTakesASignOfThousandsForTheDecimalSign) {
+  EXPECT_THAT(refusal("1.107", with_signs(",")), HasSubstr("f:2: \"1.107\" has a point, while the decimal sign is a comma"));
+  EXPECT_THAT(refusal("1.107", with_signs(",")), HasSubstr("thousands = \".\""));
+  EXPECT_THAT(refusal("1.107,5", with_signs(",")), HasSubstr("has a point"));
+  EXPECT_THAT(refusal("1,107", with_signs(".")), HasSubstr("has a comma, while the decimal sign is a point"));
+  EXPECT_THAT(refusal("1,107", with_signs(".")), HasSubstr("thousands = \",\""));
+  EXPECT_EQ(number_in("1.107", with_signs(".")), 1.107);
+  EXPECT_EQ(number_in("1,107", with_signs(",")), 1.107);
+}
+
+TEST(Delimited, TakesThousandsOutWhereTheyAreSetOffWell) {
+  for (const auto& [cell, format, value] : std::vector<std::tuple<std::string, DelimitedFormat, double>>{{"1.107", with_signs(",", "."), 1107},
+                                                                                                         {"-1.107.250,5", with_signs(",", "."), -1107250.5},
+                                                                                                         {"1107,5", with_signs(",", "."), 1107.5},
+                                                                                                         {"1.107,5e1", with_signs("", "."), 11075},
+                                                                                                         {"+12,107.25", with_signs(".", ","), 12107.25},
+                                                                                                         {"1 107,5", with_signs(",", " "), 1107.5},
+                                                                                                         {"1'107.5", with_signs("", "'"), 1107.5}})
+    EXPECT_EQ(number_in(cell, format), value) << cell;
+  for (const std::string cell : {"1.10", "1107.250", "1.1070", "1.107.25", ".107", "1.", "1.107,2.5", "0.500", "1,107.5", "1,2.000", "1..107"})
+    EXPECT_THAT(refusal(cell, with_signs(",", ".")), HasSubstr("no number whose thousands are set off by \".\"")) << cell;
+  EXPECT_EQ(read_delimited("a,b\n0,\"1,107.5\"\n", "f", with_signs("", ",")).channels[1].value[0], 1107.5);
+  EXPECT_THAT(complaint([] { read_delimited("a,b\n0,1,107.5\n", "f", with_signs("", ",")); }), HasSubstr("no cell is quoted"));
+  EXPECT_THAT(complaint([] { read_delimited("a b\n0 1 107.5\n", "f", with_signs("", " ")); }), HasSubstr("blanks"));
+}
+
+TEST(Delimited, FindsTheDecimalComma) {
+  for (const std::string text : {"t;F\n0,000;1,5\n", "t\tF\n0,000\t1,5\n", "t|F\n0,000|1,5\n", "t F\n0,000 1,5\n", "0,000 1,5\n", "0,000;1,5\n"}) {
+    const Recording r = read_delimited(text, "f");
+    ASSERT_EQ(r.channels.size(), 2u) << text;
+    EXPECT_EQ(r.channels[1].value, (Values{1.5})) << text;
+    EXPECT_THAT(r.format, HasSubstr("commas are taken for the decimal sign")) << text;
+  }
+  EXPECT_EQ(read_delimited("t;F\n0;1.5\n", "f").format, "text");
+  EXPECT_THAT(complaint([] { read_delimited("t;F\n0.5;1,5\n", "f"); }), HasSubstr("has a comma")) << "a point shows that commas are something else";
+  EXPECT_THAT(complaint([] { read_delimited("t;F\n0;1,107\n1;2,250\n", "f"); }), HasSubstr("thousands = \",\"")) << "1.107 or 1107: nobody can know";
+  EXPECT_EQ(read_delimited("t;F\n0;1,107\n1;2,25\n", "f").channels[1].value, (Values{1.107, 2.25}));
+}
+
+TEST(Delimited, ReadsQuotedCellsWithTheirDelimiterAndQuotes) {
+  const Recording quoted = read_delimited("t,a,F\n\"0,002\",\"2,5\",\"7,1\"\n", "f", with_signs(","));
+  ASSERT_EQ(quoted.channels.size(), 3u);
+  EXPECT_EQ(quoted.channels[2].value, (Values{7.1}));
+  EXPECT_EQ(read_delimited("\"0,002\",\"2,5\"\n", "f", with_signs(",")).channels[1].value, (Values{2.5}));
+  EXPECT_THAT(complaint([] { read_delimited("t,F\n0,5\n", "f", with_signs(",")); }), HasSubstr("no cell is quoted"));
+  const Recording named = read_delimited("\"Time, measured\", \"Angle \"\"alpha\"\", raw [deg]\",5\" pipe\n0,1,2\n", "f");
+  ASSERT_EQ(named.channels.size(), 3u);
+  EXPECT_EQ(named.channels[0].name, "Time, measured");
+  EXPECT_EQ(named.channels[1].name, "Angle \"alpha\", raw");
+  EXPECT_EQ(named.channels[1].unit, "deg");
+  EXPECT_EQ(named.channels[2].name, "5\" pipe");
+}
+
+TEST(Delimited, ReadsBarsAndLinesThatEndWithCarriageReturns) {
+  EXPECT_EQ(read_delimited("t|F\n0|1\n1|2\n", "f").channels[1].value, (Values{1, 2}));
+  EXPECT_EQ(read_delimited("t,|F|,a\n0,1,2\n", "f").channels.at(1).name, "|F|") << "a magnitude";
+  const Recording old = read_delimited("# remark\rt,F\r0,1\r1,2\r", "f");
+  ASSERT_EQ(old.channels.size(), 2u);
+  EXPECT_EQ(old.channels[1].value, (Values{1, 2}));
+  EXPECT_THAT(complaint([] { read_delimited("t,F\r0,1\r1,x\r", "f"); }), HasSubstr("f:3"));
 }
 
 void write_mat(const std::string& path, mat_ft version) {
