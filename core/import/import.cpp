@@ -37,14 +37,19 @@ TomlTable parse_mapping(const std::string& text, const std::string& file) {
 
 const RecordedChannel& source_of(const TomlTable& table, const Recording& recording) {
   const std::string name = table.text("source");
-  std::vector<std::string> names;
-  const RecordedChannel* found = nullptr;
-  for (const RecordedChannel& channel : recording.channels) {
-    if (channel.name == name && found) table.fail("source", fmt::format("{} holds more than one channel \"{}\"", recording.file, name), "wanted a name that only one of them has; rename the others in the recording");
-    if (channel.name == name) found = &channel;
-    names.push_back("\"" + channel.name + "\"");
+  const auto is_it = [&](const auto& channel) { return channel.name == name; };
+  const auto found = std::find_if(recording.channels.begin(), recording.channels.end(), is_it);
+  const auto left_out = std::find_if(recording.left_out.begin(), recording.left_out.end(), is_it);
+  if (std::count_if(recording.channels.begin(), recording.channels.end(), is_it) + std::count_if(recording.left_out.begin(), recording.left_out.end(), is_it) > 1)
+    table.fail("source", fmt::format("{} holds more than one channel \"{}\"", recording.file, name), "wanted a name that only one of them has; rename the others in the recording");
+  if (left_out != recording.left_out.end()) {
+    const InputError::Place named = table.place("source");
+    throw InputError({recording.file, left_out->line}, fmt::format("{}, in the column \"{}\"", left_out->why, name),
+                     fmt::format("wanted numbers only, as {}:{} makes it a column of the run", named.file, named.line), left_out->advice);
   }
-  if (found) return *found;
+  if (found != recording.channels.end()) return *found;
+  std::vector<std::string> names;
+  for (const RecordedChannel& channel : recording.channels) names.push_back("\"" + channel.name + "\"");
   constexpr std::size_t most = 40;
   if (names.size() > most) names.resize(most);
   table.fail("source", fmt::format("{} holds no channel \"{}\"", recording.file, name), fmt::format("wanted one of: {}", fmt::join(names, ", ")));
@@ -166,7 +171,7 @@ DelimitedFormat read_format(const TomlTable& mapping) {
   DelimitedFormat format;
   if (!mapping.has("format")) return format;
   const TomlTable table = mapping.table("format");
-  table.allow_only({"delimiter", "decimal", "thousands", "skip_lines", "header"});
+  table.allow_only({"delimiter", "decimal", "thousands", "missing", "skip_lines", "header"});
   format.delimiter = table.text_or("delimiter", "");
   if (format.delimiter.size() > 1 && format.delimiter != "blanks") table.fail("delimiter", fmt::format("the delimiter is \"{}\"", format.delimiter), "wanted one character, or \"blanks\"");
   format.decimal = table.text_or("decimal", "");
@@ -176,6 +181,7 @@ DelimitedFormat read_format(const TomlTable& mapping) {
   if (table.has("thousands") && std::find(signs.begin(), signs.end(), format.thousands) == signs.end())
     table.fail("thousands", fmt::format("thousands are set off by \"{}\"", format.thousands), "wanted \".\", \",\", \" \" or \"'\"");
   if (!format.thousands.empty() && format.thousands == format.decimal) table.fail("thousands", "decimal sign and sign of the thousands are the same", "wanted two different ones");
+  if (table.has("missing")) format.missing = table.texts("missing");
   if (table.has("skip_lines")) format.skip_lines = table.integer("skip_lines");
   if (format.skip_lines < 0) table.fail("skip_lines", fmt::format("skip_lines is {}", format.skip_lines), "wanted zero or more");
   if (table.has("header")) format.header = table.boolean_or("header", true);
@@ -188,13 +194,15 @@ Imported import_recording(const Recording& recording, const std::string& mapping
   const TomlTable mapping = parse_mapping(mapping_text, mapping_file);
   Imported out;
   out.warnings = recording.warnings;
+  for (const LeftOutChannel& left : recording.left_out) out.warnings.push_back(fmt::format("{}:{}: the column \"{}\" is left out: {}", recording.file, left.line, left.name, left.why));
   std::vector<Column> columns;
   for (const TomlTable& table : mapping.tables("column")) {
     columns.push_back(read_column(table, recording));
     if (columns.back().value.size() != columns.front().value.size())
       table.fail("source", fmt::format("\"{}\" has {} samples, \"{}\" has {}", columns.back().source, columns.back().value.size(), columns.front().source, columns.front().value.size()),
                  "wanted channels of one length");
-    out.columns.push_back(fmt::format("{} [{}] from {}", columns.back().name, columns.back().unit, columns.back().source));
+    const auto missing = std::count_if(columns.back().value.begin(), columns.back().value.end(), [](double x) { return !std::isfinite(x); });
+    out.columns.push_back(fmt::format("{} [{}] from {}{}", columns.back().name, columns.back().unit, columns.back().source, missing == 0 ? "" : fmt::format(", {} missing", missing)));
   }
   columns.insert(columns.begin(), read_time(mapping, recording, columns));
   if (columns[0].value.size() != columns[1].value.size())

@@ -36,6 +36,19 @@ std::optional<std::string> without_thousands(std::string_view whole, char thousa
   }
 }
 
+/// "23.11.2026", "11/23/26", "12:00": numbers with . / - or : between them.
+bool is_date_or_clock(std::string_view cell) {
+  int numbers = 0;
+  for (std::size_t i = 0; i < cell.size() && numbers < 3; ++i) {
+    if (!is_digit(cell[i])) return false;
+    while (i < cell.size() && is_digit(cell[i])) ++i;
+    ++numbers;
+    if (i < cell.size() && cell[i] == ':') return true;
+    if (i < cell.size() && numbers < 3 && std::string_view("./-").find(cell[i]) == std::string_view::npos) return false;
+  }
+  return numbers == 3;
+}
+
 std::string quoted(std::string_view cell) { return fmt::format("\"{}\"{}", cell.substr(0, 40), cell.size() > 40 ? "..." : ""); }
 
 }  // namespace
@@ -62,25 +75,24 @@ NoNumber why_no_number(std::string_view cell, const NumberForm& form) {
   if (digits && form.thousands != '\0' && cell.find(form.thousands) != std::string_view::npos)
     return {fmt::format("{} is no number whose thousands are set off by \"{}\" and whose decimal sign is \"{}\"", quoted(cell), form.thousands, form.decimal),
             "The mapping's [format] names both: decimal and thousands."};
-  if (digits && cell.find(other) != std::string_view::npos)
+  if (digits && !is_date_or_clock(cell) && cell.find(other) != std::string_view::npos)
     return {fmt::format("{} has a {}, while the decimal sign is a {}", quoted(cell), other == '.' ? "point" : "comma", other == '.' ? "comma" : "point"),
             fmt::format("The mapping's [format] can say which it is: thousands = \"{0}\" where it sets off thousands, decimal = \"{0}\" where it is the decimal sign.", other)};
   if (digits && cell.find_first_of(" '") != std::string_view::npos)
     return {fmt::format("{} is no number", quoted(cell)), "Where something sets off thousands, the mapping's [format] can name it: thousands = \" \" or \"'\"."};
-  return {fmt::format("{} is no number", quoted(cell)), "The mapping's [format] can name delimiter, decimal and skip_lines."};
+  if (is_date_or_clock(cell))
+    return {fmt::format("{} is no number and no time stamp that can be read", quoted(cell)),
+            "Time stamps are read as 2026-11-23T12:00:00.000 or 12:00:00.000; without them [time] can give the sampling rate, rate = \"500 Hz\", in place of a source."};
+  return {fmt::format("{} is no number", quoted(cell)),
+          fmt::format("Where it marks a missing sample, the mapping's [format] can say missing = [{}]; it can also name delimiter, decimal and skip_lines.", quoted(cell))};
 }
 
 void DecimalSign::see(std::string_view cell) {
   if (cell.empty() || cell.find_first_not_of("+-0123456789.,eE") != std::string_view::npos) return;
-  const std::size_t comma = cell.find(','), point = cell.find('.');
-  if (comma == std::string_view::npos) {
-    if (point != std::string_view::npos && number_with_point(cell)) point_ = true;
-    return;
-  }
-  const NumberForm with_comma{',', '.', {}}, with_point{'.', ',', {}};
-  const bool as_comma = cell_number(cell, with_comma).has_value(), as_point = cell_number(cell, with_point).has_value();
-  if (as_comma && !as_point) comma_ = true;
-  if (as_point && !as_comma) point_ = true;
+  if (cell.find_first_of(".,") == std::string_view::npos) return;
+  const bool as_comma = cell_number(cell, {',', '.', {}}).has_value(), as_point = cell_number(cell, {'.', ',', {}}).has_value();
+  comma_ = comma_ || (as_comma && !as_point);
+  point_ = point_ || (as_point && !as_comma);
 }
 
 }  // namespace unrig

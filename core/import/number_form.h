@@ -22,7 +22,7 @@ struct NoNumber {
 };
 NoNumber why_no_number(std::string_view cell, const NumberForm& form);
 
-/// Finds the decimal sign that a table's cells show. "0,5" shows a comma; "1,107" alone may be 1107 as well, and shows nothing.
+/// Finds the decimal sign that a table's cells show. "0,5" shows a comma, "0.5" a point; "1,107" and "1.107" may be 1107 as well, and show nothing.
 class DecimalSign {
  public:
   void see(std::string_view cell);
