@@ -85,7 +85,7 @@ endif()
 # The readers of files on the corpora of their fuzzers (fuzz/README.md).
 add_library(unrig_replay OBJECT fuzz/replay.cpp)
 target_link_libraries(unrig_replay PUBLIC sanitised_core)
-foreach(reader run rig tdms uff mat)
+foreach(reader run rig tdms uff mat text)
   add_executable(replay_${reader} fuzz/fuzz_${reader}.cpp)
   target_link_libraries(replay_${reader} PRIVATE unrig_replay)
   set_target_properties(replay_${reader} PROPERTIES CROSSCOMPILING_EMULATOR "${in_this_environment}")
