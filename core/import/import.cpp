@@ -11,6 +11,7 @@
 #include <fmt/ranges.h>
 
 #include "core/import/bridge.h"
+#include "core/import/column_names.h"
 #include "core/import/delimited.h"
 #include "core/import/mat5.h"
 #include "core/import/mat73.h"
@@ -156,6 +157,22 @@ Column read_time(const TomlTable& mapping, const Recording& recording, const std
   return time;
 }
 
+/// What no command reads, or only where the rig file says so, is kept in the run and easily overlooked.
+void warn_of_names(const TomlTable& mapping, const std::string& mapping_file, const std::vector<Column>& columns, std::vector<std::string>& warnings) {
+  std::vector<std::string> names;
+  for (const Column& column : columns) names.push_back(column.name);
+  const auto has = [&](std::string_view name) { return std::find(names.begin(), names.end(), name) != names.end(); };
+  const std::vector<std::string_view> read = columns_with_a_meaning();
+  for (const TomlTable& table : mapping.tables("column")) {
+    const std::string name = table.text("name");
+    const std::string meant = std::find(read.begin(), read.end(), name) == read.end() ? meant_column(name, names) : "";
+    if (!meant.empty())
+      warnings.push_back(fmt::format("{}:{}: no command reads the column \"{}\", unless a [[sensor]] of the rig file names it; did you mean \"{}\"?", mapping_file, table.place("name").line, name, meant));
+  }
+  if (!has("gauge") && !has("alpha"))
+    warnings.push_back(fmt::format("{}: the run has neither a column \"gauge\" nor \"alpha\"; its readings count only where a [[sensor]] of the rig file names their column", mapping_file));
+}
+
 std::string head(const TomlTable& mapping, const Recording& recording) {
   std::string text = "# unrig_run = 1\n";
   text += fmt::format("# # imported from {} ({})\n", toml_string(recording.file), recording.format);
@@ -208,6 +225,7 @@ Imported import_recording(const Recording& recording, const std::string& mapping
   if (columns[0].value.size() != columns[1].value.size())
     mapping.fail("time", fmt::format("the time has {} samples, \"{}\" has {}", columns[0].value.size(), columns[1].source, columns[1].value.size()), "wanted as many");
   out.samples = columns[0].value.size();
+  warn_of_names(mapping, mapping_file, columns, out.warnings);
 
   out.text = head(mapping, recording);
   for (std::size_t c = 0; c < columns.size(); ++c) out.text += fmt::format("{}{} [{}]", c == 0 ? "" : ",", columns[c].name, columns[c].unit);

@@ -18,9 +18,12 @@
 namespace unrig {
 namespace {
 
+using ::testing::AllOf;
+using ::testing::Each;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
+using ::testing::Not;
 using test::TemporaryDirectory;
 using Values = std::vector<double>;
 
@@ -100,6 +103,22 @@ TEST(Import, NamesWhatIsWrongInAMapping) {
   Recording uneven = recording();
   uneven.channels[1].value.pop_back();
   EXPECT_THAT(complaint([&] { import_recording(uneven, head + "[[column]]\nname = \"alpha\"\nsource = \"angle\"\n[[column]]\nname = \"gauge\"\nsource = \"bridge\"\n", "m"); }), HasSubstr("3 samples"));
+}
+
+TEST(Import, WarnsOfNamesThatNoCommandReads) {
+  const auto warnings = [](const std::string& name, const std::string& also = "") {
+    std::string map = head.substr(0, head.find("calibration")) + "[[column]]\nname = \"" + name + "\"\nsource = \"bridge\"\n";  // line 7
+    if (!also.empty()) map += "[[column]]\nname = \"" + also + "\"\nsource = \"angle\"\n";
+    return import_recording(recording(), map, "map.toml").warnings;
+  };
+  const auto question = [](const std::string& name) { return HasSubstr("map.toml:8: no command reads the column \"" + name + "\", unless a [[sensor]] of the rig file names it"); };
+  const auto neither = HasSubstr("neither a column \"gauge\" nor \"alpha\"");
+  for (const auto& [name, meant] : std::vector<std::pair<std::string, std::string>>{{"guage", "gauge"}, {"Gauge", "gauge"}, {"gage", "gauge"}, {"bridge", "gauge"}, {"angle", "alpha"}, {"mount_acceleratoin", "mount_acceleration"}})
+    EXPECT_THAT(warnings(name), ElementsAre(AllOf(question(name), HasSubstr("did you mean \"" + meant + "\"?")), neither)) << name;
+  EXPECT_THAT(warnings("guage", "alpha"), ElementsAre(question("guage")));
+  EXPECT_THAT(warnings("gauge2", "gauge"), Each(Not(HasSubstr("did you mean")))) << "a second one";
+  EXPECT_THAT(warnings("heave", "pitch"), ElementsAre(neither));
+  EXPECT_THAT(warnings("temperature", "alpha"), IsEmpty());
 }
 
 TEST(Delimited, FindsDelimiterAndUnits) {
