@@ -287,6 +287,12 @@ std::string to_string(RunKind kind) {
   return std::find_if(kinds.begin(), kinds.end(), [kind](const auto& one) { return one.first == kind; })->second;
 }
 
+std::vector<std::string_view> columns_with_a_meaning() {
+  std::vector<std::string_view> names;
+  for (const KnownColumn& one : known_columns) names.emplace_back(one.name);
+  return names;
+}
+
 const Channel* Run::find(std::string_view column) const {
   const auto found = std::find_if(channels.begin(), channels.end(), [column](const Channel& channel) { return channel.name == column; });
   return found == channels.end() ? nullptr : &*found;

@@ -13,6 +13,9 @@ namespace unrig {
 enum class RunKind { step, pluck, forced, moved };
 std::string to_string(RunKind kind);
 
+/// time, alpha, gauge, force ...: what commands read by itself. Other columns are read where a `[[sensor]]` of the rig names them.
+std::vector<std::string_view> columns_with_a_meaning();
+
 /// One measured column of a run on the uniform time grid, in SI. Missing samples are NaN.
 struct Channel {
   std::string name;       ///< as in the header

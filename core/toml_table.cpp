@@ -121,6 +121,16 @@ std::vector<int> TomlTable::integers(std::string_view key) const {
   return values;
 }
 
+std::vector<std::string> TomlTable::texts(std::string_view key) const {
+  std::vector<std::string> values;
+  for (const toml::node& node : array(key, "wanted a list of texts in double quotes")) {
+    const auto* text = node.as_string();
+    if (!text) fail(key, fmt::format("{}[{}] is {}", full_name(key), values.size() + 1, shown(node)), "wanted text in double quotes");
+    values.push_back(text->get());
+  }
+  return values;
+}
+
 double TomlTable::quantity(std::string_view key, std::string_view si) const {
   const toml::node& node = required(key);
   if (const auto* text = node.as_string()) return unrig::quantity(text->get(), si, place(key), full_name(key));

@@ -7,153 +7,274 @@
 #include <fmt/format.h>
 
 #include "core/error.h"
+#include "core/import/number_form.h"
+#include "core/import/table_cells.h"
+#include "core/import/time_stamp.h"
 #include "core/scan.h"
 
 namespace unrig {
 namespace {
 
-std::vector<std::string_view> cells_of(std::string_view line, const std::string& delimiter) {
-  std::vector<std::string_view> cells;
-  if (delimiter == "blanks") {
-    for (std::size_t at = line.find_first_not_of(" \t"); at != std::string_view::npos; at = line.find_first_not_of(" \t", at)) {
-      const std::size_t end = std::min(line.find_first_of(" \t", at), line.size());
-      cells.push_back(line.substr(at, end - at));
-      at = end;
-    }
-    return cells;
-  }
-  for (std::size_t at = 0;;) {
-    const std::size_t quoted = at < line.size() && line[at] == '"' ? line.find('"', at + 1) : at;
-    const std::size_t end = std::min(line.find(delimiter, quoted == std::string_view::npos ? at : quoted), line.size());
-    std::string_view cell = trimmed(line.substr(at, end - at));
-    if (cell.size() >= 2 && cell.front() == '"' && cell.back() == '"') cell = cell.substr(1, cell.size() - 2);
-    cells.push_back(cell);
-    if (end == line.size()) return cells;
-    at = end + delimiter.size();
-  }
-}
-
-std::string delimiter_in(std::string_view line, const std::string& decimal) {
-  const auto count = [&](char c) { return std::count(line.begin(), line.end(), c); };
-  for (const char c : {'\t', ';'})
-    if (count(c) > 0) return std::string(1, c);
-  if (decimal != "," && count(',') > 0) return ",";
-  return "blanks";
-}
-
 /// "Force [N]" or "Force (N)" -> name and unit.
 RecordedChannel named(std::string_view cell) {
-  RecordedChannel channel{std::string(cell), "", {}, "", 0, 0};
+  RecordedChannel channel{unescaped(cell), "", {}, "", 0, 0};
   for (const auto& [open, close] : {std::pair{'[', ']'}, std::pair{'(', ')'}}) {
     const std::size_t at = cell.rfind(open);
     if (at == std::string_view::npos || at == 0 || cell.back() != close) continue;
-    channel.name = trimmed(cell.substr(0, at));
+    channel.name = unescaped(trimmed(cell.substr(0, at)));
     channel.unit = trimmed(cell.substr(at + 1, cell.size() - at - 2));
     break;
   }
   return channel;
 }
 
-class Table {
- public:
-  Table(std::string_view text, const std::string& file, const DelimitedFormat& format) : text_(text), format_(format), out_{file, "text", {}, {}} {}
+/// "#N/A", "#DIV/0!", "#NV": marks of spreadsheets, with which a row can begin.
+bool is_spreadsheet_mark(std::string_view cell) {
+  if (!cell.starts_with('#') || cell.find_first_not_of("#ABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789/!?") != std::string_view::npos) return false;
+  return cell == "#NV" || cell.find_first_of("/!?") != std::string_view::npos;
+}
 
-  Recording read() {
-    if (text_.starts_with("\xEF\xBB\xBF")) text_.remove_prefix(3);
-    std::string_view line;
-    for (int i = 0; i < format_.skip_lines; ++i)
-      if (!next(line, false)) refuse(fmt::format("the file ends within the {} lines to skip", format_.skip_lines), "wanted a table behind them", "");
-    if (!next(line, true)) refuse("the file holds no table", "wanted rows of numbers", "");
-    if (format_.delimiter.empty()) format_.delimiter = delimiter_in(line, format_.decimal);
-    const bool header = format_.header.value_or(!all_numbers(line));
-    if (header) {
-      name_columns(cells_of(line, format_.delimiter));
-      if (next(line, true) && !units_row(line)) row(line);
-    } else {
-      const std::size_t columns = cells_of(line, format_.delimiter).size();
-      std::string_view remark = trimmed(remark_);
-      remark.remove_prefix(std::min(remark.find_first_not_of("#%"), remark.size()));
-      const std::vector<std::string_view> names = cells_of(trimmed(remark), format_.delimiter);
-      if (columns > 1 && names.size() == columns) name_columns(names);
-      else for (std::size_t c = 0; c < columns; ++c) out_.channels.push_back({fmt::format("{}", c + 1), "", {}, "", 0, 0});
-      row(line);
-    }
-    while (next(line, true)) row(line);
-    if (out_.channels.empty() || out_.channels.front().value.empty()) refuse("the table has no rows", "wanted rows of numbers", "");
-    return std::move(out_);
-  }
+/// The lines of a text one by one.
+struct Lines {
+  std::string_view text;
+  char end = '\n';
+  int line = 0;
+  bool ended = true;                       ///< the last one has its line end
+  std::string_view remark{};               ///< the last one
+  std::string delimiter{};                 ///< once it is known, a row may begin with a mark such as #N/A
+  std::vector<std::string_view> missing{};  ///< or with one of these
 
- private:
-  [[noreturn]] void refuse(const std::string& found, const std::string& wanted, const std::string& advice) const { throw InputError({out_.file, line_}, found, wanted, advice); }
-
-  bool next(std::string_view& line, bool skip_remarks) {
-    while (!text_.empty()) {
-      const std::size_t end = text_.find('\n');
-      line = text_.substr(0, end);
-      text_.remove_prefix(end == std::string_view::npos ? text_.size() : end + 1);
-      ++line_;
-      if (line.ends_with('\r')) line.remove_suffix(1);
-      const std::string_view content = trimmed(line);
-      const bool is_remark = !content.empty() && (content.front() == '#' || content.front() == '%');
-      if (!skip_remarks || !(content.empty() || is_remark)) return true;
-      if (is_remark) remark_ = line;
+  bool next(std::string_view& out, bool skip_remarks = true) {
+    while (!text.empty()) {
+      const std::size_t length = text.find(end);
+      ended = length != std::string_view::npos;
+      out = text.substr(0, length);
+      text.remove_prefix(ended ? length + 1 : text.size());
+      ++line;
+      if (out.ends_with('\r')) out.remove_suffix(1);
+      const std::string_view content = trimmed(out);
+      if (!skip_remarks || !(content.empty() || is_remark(content))) return true;
+      if (!content.empty()) remark = out;
     }
     return false;
   }
 
-  void name_columns(const std::vector<std::string_view>& cells) {
-    for (const std::string_view cell : cells) out_.channels.push_back(named(cell));
-    if (out_.channels.size() > 1 && out_.channels.back().name.empty()) out_.channels.pop_back();  // a delimiter at the end of the row
+ private:
+  bool is_remark(std::string_view content) const {
+    if (content.front() != '#' && content.front() != '%') return false;
+    if (delimiter.empty()) return true;
+    const std::string_view first = trimmed(content.substr(0, content.find_first_of(delimiter == "blanks" ? " \t" : delimiter)));
+    return !is_spreadsheet_mark(first) && std::find(missing.begin(), missing.end(), first) == missing.end();
+  }
+};
+
+/// A column, and what its cells have held so far.
+struct ReadColumn {
+  RecordedChannel channel;
+  bool numbers = false;
+  std::optional<std::string> first_stamp{};
+  SecondsSinceTheFirst seconds{};
+  std::optional<LeftOutChannel> left_out{};
+};
+
+class Table {
+ public:
+  Table(std::string_view text, const std::string& file, const DelimitedFormat& format) : lines_{text}, format_(format), out_{file, "text", {}, {}} {}
+
+  Recording read() {
+    if (lines_.text.starts_with("\xEF\xBB\xBF")) lines_.text.remove_prefix(3);
+    if (lines_.text.find('\n') == std::string_view::npos) lines_.end = '\r';  // as old Macintosh programs write
+    std::string_view line;
+    for (int i = 0; i < format_.skip_lines; ++i)
+      if (!lines_.next(line, false)) refuse(fmt::format("the file ends within the {} lines to skip", format_.skip_lines), "wanted a table behind them", "");
+    const Lines from_here = lines_;
+    if (!lines_.next(line)) refuse("the file holds no table", "wanted rows of numbers", "");
+    if (format_.delimiter.empty()) format_.delimiter = delimiter_in(line);
+    lines_.delimiter = format_.delimiter;
+    lines_.missing.assign(format_.missing.begin(), format_.missing.end());
+    find_number_form(from_here);
+    if (format_.header.value_or(!all_values(line))) {
+      take_names(cells_of(line, format_.delimiter));
+      if (lines_.next(line) && !units_row(line)) row(line);
+    } else {
+      name_by_remark(cells_of(line, format_.delimiter).size());
+      row(line);
+    }
+    while (lines_.next(line)) row(line);
+    return finished();
   }
 
-  bool is_number(std::string_view cell) const {
-    std::string copy(cell);
-    if (format_.decimal == ",") std::replace(copy.begin(), copy.end(), ',', '.');
-    double value = 0;
-    return !copy.empty() && read_number(copy.data(), copy.data() + copy.size(), value) == copy.data() + copy.size();
+ private:
+  [[noreturn]] void refuse(const std::string& found, const std::string& wanted, const std::string& advice) const { throw InputError({out_.file, lines_.line}, found, wanted, advice); }
+
+  // ------------------------------------------------------------------------------------------------------------ how numbers are written
+
+  /// What the format says, else what all cells from the first row on show.
+  void find_number_form(Lines lines) {
+    form_.missing = format_.missing;
+    if (!format_.thousands.empty()) form_.thousands = format_.thousands.front();
+    if (!format_.decimal.empty()) form_.decimal = format_.decimal.front();
+    else if (form_.thousands == '.') form_.decimal = ',';
+    else if (form_.thousands != ',' && format_.delimiter != "," && shows_commas(lines)) {
+      form_.decimal = ',';
+      out_.format = "text; by its numbers the decimal sign is the comma";
+    }
+    const bool twice = format_.delimiter == "," && (form_.decimal == ',' || form_.thousands == ',');
+    if (twice && lines.text.find('"') == std::string_view::npos)
+      refuse("commas stand between the cells and within numbers, and no cell is quoted", "wanted another delimiter, or numbers in quotes",
+             "The mapping's [format] names delimiter, decimal and thousands.");
+    if (format_.delimiter == "blanks" && form_.thousands == ' ')
+      refuse("blanks stand between the cells and within numbers", "wanted another delimiter", "The mapping's [format] names delimiter, decimal and thousands.");
   }
 
-  bool all_numbers(std::string_view line) const {
+  bool shows_commas(Lines lines) const {
+    if (lines.text.find(',') == std::string_view::npos) return false;
+    DecimalSign sign;
+    std::vector<std::string_view> cells;
+    for (std::string_view line; !sign.is_point() && lines.next(line);) {
+      split_cells(line, format_.delimiter, cells);
+      for (const std::string_view cell : cells) sign.see(cell);
+    }
+    return sign.is_comma();
+  }
+
+  bool is_missing(std::string_view cell) const { return cell.empty() || std::find(form_.missing.begin(), form_.missing.end(), cell) != form_.missing.end(); }
+  bool is_value(std::string_view cell) const { return cell_number(cell, form_) || read_time_stamp(cell); }
+
+  bool all_values(std::string_view line) const {
     const std::vector<std::string_view> cells = cells_of(line, format_.delimiter);
-    return std::all_of(cells.begin(), cells.end(), [&](std::string_view cell) { return cell.empty() || is_number(cell); });
+    return std::all_of(cells.begin(), cells.end(), [&](std::string_view cell) { return is_missing(cell) || is_value(cell); });
   }
 
-  /// Takes a row below a header without units that holds no number and no gap for the units.
+  // ------------------------------------------------------------------------------------------------------------ names and units
+
+  void take_names(std::vector<std::string_view> cells) {
+    while (cells.size() > 1 && cells.back().empty()) cells.pop_back();  // delimiters at the end of the row
+    for (const std::string_view cell : cells) {
+      if (!format_.header && is_value(cell))
+        out_.warnings.push_back(fmt::format("{}:{}: \"{}\" is taken for the name of a column, as the row holds text too; `header = false` in [format] makes it a row", out_.file, lines_.line,
+                                            cell.substr(0, 40)));
+      columns_.push_back({cell.empty() ? RecordedChannel{fmt::format("{}", columns_.size() + 1), "", {}, "", 0, 0} : named(cell)});
+    }
+    first_line_ = lines_.line;
+  }
+
+  void name_by_remark(std::size_t columns) {
+    std::string_view remark = trimmed(lines_.remark);
+    remark.remove_prefix(std::min(remark.find_first_not_of("#%"), remark.size()));
+    const std::vector<std::string_view> names = cells_of(trimmed(remark), format_.delimiter);
+    const bool fit = columns > 1 && names.size() == columns;
+    for (std::size_t c = 0; c < columns; ++c) columns_.push_back({fit ? named(names[c]) : RecordedChannel{fmt::format("{}", c + 1), "", {}, "", 0, 0}});
+    first_line_ = lines_.line;
+  }
+
+  /// Takes a row below a header without units for the units where it holds no value and each column with a value in the first row that has any holds text here.
   bool units_row(std::string_view line) {
     const std::vector<std::string_view> cells = cells_of(line, format_.delimiter);
-    if (cells.size() < out_.channels.size()) return false;
-    for (std::size_t c = 0; c < cells.size(); ++c)
-      if (c < out_.channels.size() ? cells[c].empty() || is_number(cells[c]) || !out_.channels[c].unit.empty() : !cells[c].empty()) return false;
-    for (std::size_t c = 0; c < out_.channels.size(); ++c) {
+    const auto no_unit = [&](std::string_view cell) { return !cell.empty() && (is_missing(cell) || is_value(cell) || cell.find_first_not_of("+-0123456789.,") == std::string_view::npos); };
+    if (std::any_of(cells.begin(), cells.end(), no_unit)) return false;
+    for (std::size_t c = columns_.size(); c < cells.size(); ++c)
+      if (!cells[c].empty()) return false;
+    if (std::any_of(columns_.begin(), columns_.end(), [](const ReadColumn& column) { return !column.channel.unit.empty(); })) return false;
+    if (!heads_values(cells)) return false;
+    for (std::size_t c = 0; c < columns_.size() && c < cells.size(); ++c) {
       std::string_view unit = cells[c];
       if (unit.size() > 2 && ((unit.front() == '[' && unit.back() == ']') || (unit.front() == '(' && unit.back() == ')'))) unit = trimmed(unit.substr(1, unit.size() - 2));
-      out_.channels[c].unit = unit;
+      columns_[c].channel.unit = unit;
     }
     return true;
   }
 
+  bool heads_values(const std::vector<std::string_view>& units) const {
+    constexpr int furthest = 1000;
+    Lines ahead = lines_;
+    std::vector<std::string_view> cells;
+    std::string_view line;
+    for (int i = 0; i < furthest && ahead.next(line); ++i) {
+      split_cells(line, format_.delimiter, cells);
+      bool any = false;
+      for (std::size_t c = 0; c < cells.size(); ++c) {
+        if (is_missing(cells[c]) || !is_value(cells[c])) continue;
+        any = true;
+        if (c >= units.size() || units[c].empty()) return false;
+      }
+      if (any) return true;
+    }
+    return false;
+  }
+
+  // ------------------------------------------------------------------------------------------------------------ rows
+
   void row(std::string_view line) {
-    const std::vector<std::string_view> cells = cells_of(line, format_.delimiter);
-    // A delimiter at the end of each row makes one empty cell too many.
-    const std::size_t count = cells.size() == out_.channels.size() + 1 && cells.back().empty() ? cells.size() - 1 : cells.size();
-    if (count != out_.channels.size())
-      refuse(fmt::format("the row has {} cells", count), fmt::format("wanted {}, as in the first", out_.channels.size()), "The mapping's [format] can name delimiter, decimal and skip_lines.");
-    for (std::size_t c = 0; c < count; ++c) out_.channels[c].value.push_back(number(cells[c], out_.channels[c].name));
+    const std::size_t before = cells_.size();
+    split_cells(line, format_.delimiter, cells_);
+    const bool cut = !lines_.ended && rows_ > 0 && cells_.size() < before;  // a number before the cut may be cut too
+    while (cells_.size() > columns_.size() && cells_.back().empty()) cells_.pop_back();
+    if (cells_.size() > columns_.size() || (cells_.size() < columns_.size() && (cut || format_.delimiter == "blanks"))) refuse_row();
+    for (std::size_t c = 0; c < cells_.size(); ++c) take(cells_[c], columns_[c]);
+    for (std::size_t c = cells_.size(); c < columns_.size(); ++c) {
+      if (columns_[c].numbers || columns_[c].first_stamp) refuse_row();
+      leave_out(columns_[c], "the row ends before it", "Each row needs as many cells as the header, if only empty ones.");
+    }
+    ++rows_;
   }
 
-  double number(std::string_view cell, const std::string& column) const {
-    if (cell.empty()) return std::numeric_limits<double>::quiet_NaN();
-    std::string copy(cell);
-    if (format_.decimal == ",") std::replace(copy.begin(), copy.end(), ',', '.');
-    double value = 0;
-    if (read_number(copy.data(), copy.data() + copy.size(), value) != copy.data() + copy.size())
-      refuse(fmt::format("\"{}\" in the column \"{}\" is no number", cell.substr(0, 40), column), "wanted a number", "The mapping's [format] can name delimiter, decimal and skip_lines.");
-    return value;
+  [[noreturn]] void refuse_row() const {
+    refuse(fmt::format("the row has {} cells", cells_.size()), fmt::format("wanted {}, as in the first", columns_.size()), "The mapping's [format] can name delimiter, decimal and skip_lines.");
   }
 
-  std::string_view text_, remark_;  // remark_: the last one
+  void take(std::string_view cell, ReadColumn& column) {
+    if (column.left_out) return;
+    const std::optional<double> number = is_missing(cell) ? std::numeric_limits<double>::quiet_NaN() : cell_number(cell, form_);
+    if (number && (std::isnan(*number) || !column.first_stamp)) {
+      column.numbers = column.numbers || !std::isnan(*number);
+      column.channel.value.push_back(*number);
+      return;
+    }
+    const std::optional<TimeStamp> stamp = column.numbers ? std::nullopt : read_time_stamp(cell);
+    const std::optional<double> second = stamp ? column.seconds(*stamp) : std::nullopt;
+    if (second) {
+      if (!column.first_stamp) column.first_stamp = cell;
+      column.channel.value.push_back(*second);
+      return;
+    }
+    const NoNumber no = why_no_number(cell, form_);
+    if (column.first_stamp) leave_out(column, fmt::format("\"{}\" is no time stamp like \"{}\" above it", cell.substr(0, 40), *column.first_stamp), no.advice);
+    else leave_out(column, no.why, no.advice);
+  }
+
+  void leave_out(ReadColumn& column, const std::string& why, const std::string& advice) const {
+    if (column.left_out) return;
+    column.left_out = {column.channel.name, lines_.line, why, advice};
+    Values().swap(column.channel.value);
+  }
+
+  Recording finished() {
+    if (rows_ == 0) refuse("the table has no rows", "wanted rows of numbers", "");
+    for (ReadColumn& column : columns_) {
+      if (!column.left_out && !column.numbers && !column.first_stamp) column.left_out = {column.channel.name, first_line_, "all its cells are empty", "A column of the run needs numbers."};
+      if (column.first_stamp) {
+        column.channel.unit = "s";
+        column.channel.remark = fmt::format("since {}", *column.first_stamp);
+      }
+      if (column.left_out) out_.left_out.push_back(*column.left_out);
+      else out_.channels.push_back(std::move(column.channel));
+    }
+    if (out_.channels.empty()) {
+      const LeftOutChannel& first = out_.left_out.front();
+      throw InputError({out_.file, first.line}, fmt::format("no column holds numbers only: {}, in the column \"{}\"", first.why, first.name), "wanted a column of numbers", first.advice);
+    }
+    return std::move(out_);
+  }
+
+  using Values = std::vector<double>;
+  Lines lines_;
   DelimitedFormat format_;
-  int line_ = 0;
+  NumberForm form_;
+  std::vector<ReadColumn> columns_;
+  std::vector<std::string_view> cells_;  // of the last row
+  int first_line_ = 0;                   // of the header, or of the first row
+  std::size_t rows_ = 0;
   Recording out_;
 };
 

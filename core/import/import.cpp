@@ -1,6 +1,7 @@
 #include "core/import/import.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <iterator>
 #include <optional>
@@ -10,6 +11,7 @@
 #include <fmt/ranges.h>
 
 #include "core/import/bridge.h"
+#include "core/import/column_names.h"
 #include "core/import/delimited.h"
 #include "core/import/mat5.h"
 #include "core/import/mat73.h"
@@ -36,14 +38,19 @@ TomlTable parse_mapping(const std::string& text, const std::string& file) {
 
 const RecordedChannel& source_of(const TomlTable& table, const Recording& recording) {
   const std::string name = table.text("source");
-  std::vector<std::string> names;
-  const RecordedChannel* found = nullptr;
-  for (const RecordedChannel& channel : recording.channels) {
-    if (channel.name == name && found) table.fail("source", fmt::format("{} holds more than one channel \"{}\"", recording.file, name), "wanted a name that only one of them has; rename the others in the recording");
-    if (channel.name == name) found = &channel;
-    names.push_back("\"" + channel.name + "\"");
+  const auto is_it = [&](const auto& channel) { return channel.name == name; };
+  const auto found = std::find_if(recording.channels.begin(), recording.channels.end(), is_it);
+  const auto left_out = std::find_if(recording.left_out.begin(), recording.left_out.end(), is_it);
+  if (std::count_if(recording.channels.begin(), recording.channels.end(), is_it) + std::count_if(recording.left_out.begin(), recording.left_out.end(), is_it) > 1)
+    table.fail("source", fmt::format("{} holds more than one channel \"{}\"", recording.file, name), "wanted a name that only one of them has; rename the others in the recording");
+  if (left_out != recording.left_out.end()) {
+    const InputError::Place named = table.place("source");
+    throw InputError({recording.file, left_out->line}, fmt::format("{}, in the column \"{}\"", left_out->why, name),
+                     fmt::format("wanted numbers only, as {}:{} makes it a column of the run", named.file, named.line), left_out->advice);
   }
-  if (found) return *found;
+  if (found != recording.channels.end()) return *found;
+  std::vector<std::string> names;
+  for (const RecordedChannel& channel : recording.channels) names.push_back("\"" + channel.name + "\"");
   constexpr std::size_t most = 40;
   if (names.size() > most) names.resize(most);
   table.fail("source", fmt::format("{} holds no channel \"{}\"", recording.file, name), fmt::format("wanted one of: {}", fmt::join(names, ", ")));
@@ -150,6 +157,22 @@ Column read_time(const TomlTable& mapping, const Recording& recording, const std
   return time;
 }
 
+/// What no command reads, or only where the rig file says so, is kept in the run and easily overlooked.
+void warn_of_names(const TomlTable& mapping, const std::string& mapping_file, const std::vector<Column>& columns, std::vector<std::string>& warnings) {
+  std::vector<std::string> names;
+  for (const Column& column : columns) names.push_back(column.name);
+  const auto has = [&](std::string_view name) { return std::find(names.begin(), names.end(), name) != names.end(); };
+  const std::vector<std::string_view> read = columns_with_a_meaning();
+  for (const TomlTable& table : mapping.tables("column")) {
+    const std::string name = table.text("name");
+    const std::string meant = std::find(read.begin(), read.end(), name) == read.end() ? meant_column(name, names) : "";
+    if (!meant.empty())
+      warnings.push_back(fmt::format("{}:{}: no command reads the column \"{}\", unless a [[sensor]] of the rig file names it; did you mean \"{}\"?", mapping_file, table.place("name").line, name, meant));
+  }
+  if (!has("gauge") && !has("alpha"))
+    warnings.push_back(fmt::format("{}: the run has neither a column \"gauge\" nor \"alpha\"; its readings count only where a [[sensor]] of the rig file names their column", mapping_file));
+}
+
 std::string head(const TomlTable& mapping, const Recording& recording) {
   std::string text = "# unrig_run = 1\n";
   text += fmt::format("# # imported from {} ({})\n", toml_string(recording.file), recording.format);
@@ -161,24 +184,48 @@ std::string head(const TomlTable& mapping, const Recording& recording) {
   return text;
 }
 
+DelimitedFormat read_format(const TomlTable& mapping) {
+  DelimitedFormat format;
+  if (!mapping.has("format")) return format;
+  const TomlTable table = mapping.table("format");
+  table.allow_only({"delimiter", "decimal", "thousands", "missing", "skip_lines", "header"});
+  format.delimiter = table.text_or("delimiter", "");
+  if (format.delimiter.size() > 1 && format.delimiter != "blanks") table.fail("delimiter", fmt::format("the delimiter is \"{}\"", format.delimiter), "wanted one character, or \"blanks\"");
+  format.decimal = table.text_or("decimal", "");
+  if (table.has("decimal") && format.decimal != "." && format.decimal != ",") table.fail("decimal", fmt::format("the decimal sign is \"{}\"", format.decimal), "wanted \".\" or \",\"");
+  format.thousands = table.text_or("thousands", "");
+  constexpr std::array signs = {".", ",", " ", "'"};
+  if (table.has("thousands") && std::find(signs.begin(), signs.end(), format.thousands) == signs.end())
+    table.fail("thousands", fmt::format("thousands are set off by \"{}\"", format.thousands), "wanted \".\", \",\", \" \" or \"'\"");
+  if (!format.thousands.empty() && format.thousands == format.decimal) table.fail("thousands", "decimal sign and sign of the thousands are the same", "wanted two different ones");
+  if (table.has("missing")) format.missing = table.texts("missing");
+  if (table.has("skip_lines")) format.skip_lines = table.integer("skip_lines");
+  if (format.skip_lines < 0) table.fail("skip_lines", fmt::format("skip_lines is {}", format.skip_lines), "wanted zero or more");
+  if (table.has("header")) format.header = table.boolean_or("header", true);
+  return format;
+}
+
 }  // namespace
 
 Imported import_recording(const Recording& recording, const std::string& mapping_text, const std::string& mapping_file) {
   const TomlTable mapping = parse_mapping(mapping_text, mapping_file);
   Imported out;
   out.warnings = recording.warnings;
+  for (const LeftOutChannel& left : recording.left_out) out.warnings.push_back(fmt::format("{}:{}: the column \"{}\" is left out: {}", recording.file, left.line, left.name, left.why));
   std::vector<Column> columns;
   for (const TomlTable& table : mapping.tables("column")) {
     columns.push_back(read_column(table, recording));
     if (columns.back().value.size() != columns.front().value.size())
       table.fail("source", fmt::format("\"{}\" has {} samples, \"{}\" has {}", columns.back().source, columns.back().value.size(), columns.front().source, columns.front().value.size()),
                  "wanted channels of one length");
-    out.columns.push_back(fmt::format("{} [{}] from {}", columns.back().name, columns.back().unit, columns.back().source));
+    const auto missing = std::count_if(columns.back().value.begin(), columns.back().value.end(), [](double x) { return !std::isfinite(x); });
+    out.columns.push_back(fmt::format("{} [{}] from {}{}", columns.back().name, columns.back().unit, columns.back().source, missing == 0 ? "" : fmt::format(", {} missing", missing)));
   }
   columns.insert(columns.begin(), read_time(mapping, recording, columns));
   if (columns[0].value.size() != columns[1].value.size())
     mapping.fail("time", fmt::format("the time has {} samples, \"{}\" has {}", columns[0].value.size(), columns[1].source, columns[1].value.size()), "wanted as many");
   out.samples = columns[0].value.size();
+  warn_of_names(mapping, mapping_file, columns, out.warnings);
 
   out.text = head(mapping, recording);
   for (std::size_t c = 0; c < columns.size(); ++c) out.text += fmt::format("{}{} [{}]", c == 0 ? "" : ",", columns[c].name, columns[c].unit);
@@ -209,19 +256,7 @@ Recording read_recording(const std::string& path, const std::string& mapping_tex
     return read_uff(bytes, path);
   bytes = in_utf8(std::move(bytes));
   if (bytes.find('\0') != std::string::npos) throw InputError({path, 0}, "the file is binary, and in no format that is known here", "wanted TDMS, MATLAB 5 or 7.3, universal file 58, or text", "");
-  DelimitedFormat format;
-  if (mapping.has("format")) {
-    const TomlTable table = mapping.table("format");
-    table.allow_only({"delimiter", "decimal", "skip_lines", "header"});
-    format.delimiter = table.text_or("delimiter", "");
-    if (format.delimiter.size() > 1 && format.delimiter != "blanks") table.fail("delimiter", fmt::format("the delimiter is \"{}\"", format.delimiter), "wanted one character, or \"blanks\"");
-    format.decimal = table.text_or("decimal", ".");
-    if (format.decimal != "." && format.decimal != ",") table.fail("decimal", fmt::format("the decimal sign is \"{}\"", format.decimal), "wanted \".\" or \",\"");
-    if (format.decimal == format.delimiter) table.fail("decimal", "decimal sign and delimiter are the same", "wanted two different ones");
-    if (table.has("skip_lines")) format.skip_lines = table.integer("skip_lines");
-    if (table.has("header")) format.header = table.boolean_or("header", true);
-  }
-  return read_delimited(bytes, path, format);
+  return read_delimited(bytes, path, read_format(mapping));
 }
 
 }  // namespace unrig

@@ -14,23 +14,23 @@ namespace unrig {
 ///     density = "998.2 kg/m^3"
 ///     speed = "0.6 m/s"
 ///     [time]                      # left out: the sampling that the file gives with its channels
-///     source = "Time"             # a channel of the file, with `unit` where the file gives none; or else
+///     source = "Time"             # a channel of the file, with `unit` where the file gives none; time stamps become seconds since the first; or else
 ///     rate = "500 Hz"             # the sampling rate, with `start` = "0 s"
 ///     [[column]]                  # one table per column of the run
-///     name = "gauge"
+///     name = "gauge"              # as formats.md names columns; others are read where a [[sensor]] of the rig file names them
 ///     source = "Rig/Bridge"       # a channel of the file
 ///     unit = "V"                  # where the file gives none
 ///     raw = true                  # takes converter counts as they are, in the unit "1", for a calibration in N per count
 ///     bridge.kind = "full-1"      # volts to strain: quarter-1, quarter-2, half-1, half-2, full-1, full-2, full-3 (core/import/bridge.h)
 ///     bridge.gauge_factor = 2.1   # with .poisson, .excitation = "2.5 V", .initial_voltage, .gauge_resistance = "350 ohm", .lead_resistance,
 ///                                 # and .shunt_gain, or .shunt_reading and .shunt_expected (voltages) in its place
-///     [format]                    # of text, where it is not found out: delimiter, decimal, skip_lines, header (core/import/delimited.h)
+///     [format]                    # of text, where it is not found out: delimiter, decimal, thousands, missing, skip_lines, header (core/import/delimited.h)
 ///
 /// Readings that a converter left unscaled are never taken for physical values: without `raw = true` they are an error.
 struct Imported {
   std::string text;                   ///< of the run file
   std::vector<std::string> warnings;
-  std::vector<std::string> columns;   ///< "gauge [V] from Rig/Bridge"
+  std::vector<std::string> columns;   ///< "gauge [V] from Rig/Bridge, 3 missing"
   std::size_t samples = 0;
 };
 

@@ -1,5 +1,8 @@
 #include "core/import/import_command.h"
 
+#include <algorithm>
+#include <cmath>
+
 #include <CLI/CLI.hpp>
 #include <fmt/format.h>
 
@@ -14,9 +17,12 @@ namespace {
 
 void list_channels(const Recording& recording) {
   fmt::print("{}: {}, {} channels\n", recording.file, recording.format, recording.channels.size());
-  for (const RecordedChannel& channel : recording.channels)
-    fmt::print("  {:<30} {:>9} samples{}{}{}\n", channel.name, channel.value.size(), channel.unit.empty() ? "" : ", in " + channel.unit,
-               channel.step > 0 ? fmt::format(", every {:.9g} s", channel.step) : "", channel.raw.empty() ? "" : ", UNSCALED: " + channel.raw);
+  for (const RecordedChannel& channel : recording.channels) {
+    const auto missing = std::count_if(channel.value.begin(), channel.value.end(), [](double x) { return !std::isfinite(x); });
+    fmt::print("  {:<30} {:>9} samples{}{}{}{}{}\n", channel.name, channel.value.size(), missing == 0 ? "" : fmt::format(", {} missing", missing), channel.unit.empty() ? "" : ", in " + channel.unit,
+               channel.remark.empty() ? "" : " " + channel.remark, channel.step > 0 ? fmt::format(", every {:.9g} s", channel.step) : "", channel.raw.empty() ? "" : ", UNSCALED: " + channel.raw);
+  }
+  for (const LeftOutChannel& left : recording.left_out) fmt::print("  {:<30} left out: {} (line {})\n", left.name, left.why, left.line);
 }
 
 }  // namespace
@@ -32,14 +38,15 @@ int import_command(int argc, char** argv) {
   app.footer(
       "Example:\n  unrig import step.tdms --list\n  unrig import step.tdms --map map.toml -o step.csv\n\nwith a map.toml such as\n"
       "  unrig_import = 1\n  [run]\n  kind = \"step\"\n  medium = \"water\"\n  density = \"998.2 kg/m^3\"\n  speed = \"0.6 m/s\"\n  calibration = \"4.4 N/V\"\n"
-      "  [time]                       # left out where the file gives the sampling of its channels\n  rate = \"500 Hz\"              # or: source = \"Time\", unit = \"s\"\n"
+      "  [time]                       # left out where the file gives the sampling of its channels\n  rate = \"500 Hz\"              # or: source = \"Time\", unit = \"s\" (time stamps of ISO 8601: no unit)\n"
       "  [[column]]\n  name = \"alpha\"\n  source = \"Rig/Angle\"         # as --list shows it\n  unit = \"deg\"                 # where the file gives none\n"
       "  [[column]]\n  name = \"gauge\"\n  source = \"Rig/Bridge\"\n  unit = \"V\"\n"
       "  # raw = true                 # takes unscaled converter counts, for a calibration in N per count\n"
       "  # bridge.kind = \"full-1\"     # volts to strain: quarter-1, quarter-2, half-1, half-2, full-1, full-2, full-3,\n"
       "  #                            # with bridge.gauge_factor, .poisson, .excitation, .initial_voltage, .gauge_resistance,\n"
       "  #                            # .lead_resistance, .shunt_gain (or .shunt_reading and .shunt_expected)\n"
-      "  # [format]                   # of text, where it is not found out: delimiter = \";\", decimal = \",\", skip_lines = 3, header = false");
+      "  # [format]                   # of text, where it is not found out: delimiter = \";\", decimal = \",\", thousands = \".\",\n"
+      "  #                            # missing = [\"ERR\", \"#N/A\"], skip_lines = 3, header = false");
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& e) {
@@ -62,7 +69,7 @@ int import_command(int argc, char** argv) {
   write_text(output, imported.text);
   progress.clear();
   for (const std::string& warning : imported.warnings) warn(warning);
-  fmt::print("{}: {} samples\n", output, imported.samples);
+  fmt::print("{}: {} samples from {} ({})\n", output, imported.samples, recording.file, recording.format);
   for (const std::string& column : imported.columns) fmt::print("  {}\n", column);
   return exit_done;
 }

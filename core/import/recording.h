@@ -11,6 +11,14 @@ struct RecordedChannel {
   std::vector<double> value;
   std::string raw;             ///< not empty: these are unscaled converter counts, and why they could not be scaled
   double step = 0, start = 0;  ///< s: where the file gives the channel's own sampling; step 0: it does not
+  std::string remark{};        ///< what else to know about it: how time stamps became seconds
+};
+
+/// A column that a text file has and that holds no numbers, or not only numbers.
+struct LeftOutChannel {
+  std::string name;
+  int line = 0;             ///< where that shows
+  std::string why, advice;  ///< "\"OK\" is no number", and what to do where it should have been read
 };
 
 /// What a reader found in a file.
@@ -19,6 +27,7 @@ struct Recording {
   std::string format;  ///< "TDMS", "UFF 58", "MAT", "text"
   std::vector<RecordedChannel> channels;
   std::vector<std::string> warnings;  ///< what could not be read, and was left out
+  std::vector<LeftOutChannel> left_out{};
 };
 
 }  // namespace unrig

@@ -89,6 +89,49 @@ TEST(ImportCommand, LeavesOutWhatAsksForAllMemory) {
   EXPECT_THAT(finished.out, AllOf(HasSubstr("time"), Not(HasSubstr("gauge"))));
 }
 
+TEST(ImportCommand, LeavesOutTextAndNamesItWhereItIsMapped) {
+  const TemporaryDirectory directory;
+  std::string text = "Stamp;Clock;F;Status;G\n";
+  for (int k = 0; k < 20; ++k) text += "23.11.2026 12:00:00,0" + std::to_string(10 + k) + ";12:00:00,0" + std::to_string(10 + k) + ";" + (k == 5 ? "ERR" : "0," + std::to_string(k)) + ";OK;1\n";
+  const std::string file = directory.file("log.csv", text);
+  const auto import_with = [&](const std::string& mapping) { return run_unrig(directory, {"import", file, "--map", directory.file("map.toml", mapping), "-o", directory.path("run.csv")}); };
+  const std::string force = "F\"\nunit = \"N\"\n";
+
+  const Finished listed = run_unrig(directory, {"import", file, "--list"});
+  EXPECT_THAT(listed.out, HasSubstr("the decimal sign is the comma, 2 channels"));
+  EXPECT_THAT(listed.out, HasSubstr("in s since 12:00:00,010"));
+  EXPECT_THAT(listed.out, HasSubstr("left out: \"OK\" is no number (line 2)"));
+
+  const Finished unmarked = import_with(map + force);
+  EXPECT_EQ(unmarked.status, 2);
+  EXPECT_THAT(unmarked.err, HasSubstr("log.csv:7: \"ERR\" is no number, in the column \"F\"; wanted numbers only, as " + directory.path("map.toml") + ":10 makes it a column of the run. "));
+  EXPECT_THAT(unmarked.err, HasSubstr("missing = [\"ERR\"]"));
+  EXPECT_FALSE(std::filesystem::exists(directory.path("run.csv")));
+
+  const std::string marked = map + force + "[format]\nmissing = [\"ERR\"]\n";
+  const Finished with_rate = import_with(marked);
+  ASSERT_EQ(with_rate.status, 0) << with_rate.err;
+  EXPECT_THAT(with_rate.out, HasSubstr("20 samples from " + file + " (text; by its numbers the decimal sign is the comma)"));
+  EXPECT_THAT(with_rate.out, HasSubstr("gauge [N] from F, 1 missing"));
+  EXPECT_THAT(with_rate.err, HasSubstr("log.csv:2: the column \"Stamp\" is left out: \"23.11.2026 12:00:00,010\" is no number and no time stamp"));
+  EXPECT_EQ(read_run(directory.path("run.csv")).channel("gauge").missing, 1u);
+
+  const auto timed_by = [&](const std::string& source) {
+    std::string mapping = marked;
+    return import_with(mapping.replace(mapping.find("rate = \"500 Hz\""), 15, "source = \"" + source + "\""));
+  };
+  ASSERT_EQ(timed_by("Clock").status, 0) << timed_by("Clock").err;
+  EXPECT_NEAR(read_run(directory.path("run.csv")).dt, 0.001, 1e-15);
+  EXPECT_EQ(timed_by("Stamp").status, 2);
+  EXPECT_THAT(timed_by("Stamp").err, HasSubstr("rate = \"500 Hz\""));
+
+  const Finished wrong = import_with(map + force + "[format]\nmissing = \"ERR\"\n");
+  EXPECT_EQ(wrong.status, 2);
+  EXPECT_THAT(wrong.err, HasSubstr("wanted a list of texts"));
+  for (const std::string format : {"thousands = \";\"", "thousands = \",\"\ndecimal = \",\"", "skip_lines = -1", "decimal = \"\""})
+    EXPECT_EQ(import_with(map + force + "[format]\n" + format + "\n").status, 2) << format;
+}
+
 TEST(ImportCommand, RefusesAndLeavesNothingBehind) {
   const TemporaryDirectory directory;
   const std::string mapping = directory.file("map.toml", map + "F\"\nunit = \"N\"\n");
