@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <array>
 #include <cmath>
 #include <cstdint>
 #include <filesystem>
@@ -120,6 +121,58 @@ TEST(Report, ShowsALoadOnARigThatIsKnownOnlyAsModes) {
   ASSERT_TRUE(plot_titled(data, "Gauge and what the measured inputs do to it"));
   ASSERT_TRUE(plot_titled(data, "The load alone"));
   ASSERT_TRUE(plot_titled(data, "Spectra before and after the correction"));
+}
+
+TEST(Report, ACorrectionThatIsWrongGetsNoTick) {
+  const TemporaryDirectory directory;
+  make_results(directory);
+  // Friction acts in this campaign; the fit knows of none.
+  const std::string run = test::source_path("sample_data/campaigns/friction/step_a.csv"), corrected = directory.path("wrong.csv"), indicial = directory.path("wrong_indicial.csv");
+  const Finished finished = run_unrig(directory, {"correct", "--rig", test::null_campaign("rig.toml"), "--fit", directory.path("fit.json"), run, "-o", corrected, "--indicial", indicial});
+  ASSERT_EQ(finished.status, 0) << finished.err;
+  ASSERT_THAT(finished.err, HasSubstr("Something is missing from the rig of the fit"));
+  const std::string output = directory.path("report.html");
+  ASSERT_EQ(run_unrig(directory, {"report", corrected, indicial, "-o", output}).status, 0);
+  const json data = page_data(output);
+  for (const json& verdict : data["verdicts"]) {
+    EXPECT_EQ(verdict["tone"], "bad") << verdict;
+    EXPECT_THAT(verdict["text"].get<std::string>(), ::testing::StartsWith("Not to be trusted: gauge and angle are explained to a reduced chi-square of ")) << verdict;
+  }
+  std::size_t warnings = 0;
+  for (const json& text : blocks(data, "text")) warnings += text["text"].get<std::string>().find("Something is missing from the rig of the fit") != std::string::npos ? 1 : 0;
+  EXPECT_EQ(warnings, 2u) << "one in each section";
+  const json* residual = plot_titled(data, "Residual of the gauge");
+  ASSERT_TRUE(residual);
+  EXPECT_EQ((*residual)["group"], (*plot_titled(data, "Gauge and the load of a rigid rig"))["group"]) << "zooms with the load";
+}
+
+TEST(Report, TheToneOfACorrectionFollowsItsWarnings) {
+  const TemporaryDirectory directory;
+  const std::string columns = "time [s],semichords,gauge [N],normal_force [N],normal_force_std [N],circulatory [N],circulatory_std [N],cn,cn_std";
+  const std::vector<std::array<std::string, 4>> tables{{",reduced_chi2", ",1.02", ",1.02", "good"},
+                                                       {",reduced_chi2,warning", ",1.02,a.csv: 3 samples are missing", ",1.02,", "open"},
+                                                       {",reduced_chi2,warning", ",1.02,a.csv: Load and response are wrong.", ",1.02,", "bad"},
+                                                       {",reduced_chi2", ",1.6", ",1.6", "bad"},
+                                                       {"", "", "", "open"}};
+  for (const auto& [header, first, second, tone] : tables) {
+    const std::string file = directory.file("corrected.csv", columns + header + "\n0,0,1,1,0.1,1,0.1,1,0.1" + first + "\n1,1,1,1,0.1,1,0.1,1,0.1" + second + "\n"), output = directory.path("report.html");
+    ASSERT_EQ(run_unrig(directory, {"report", file, "-o", output}).status, 0);
+    EXPECT_EQ(page_data(output)["verdicts"][0]["tone"], tone) << header << first;
+  }
+}
+
+TEST(Report, TheIndicialResponseIsComparedWithWagnersByTheBandOfTheWholeCurve) {
+  const TemporaryDirectory directory;
+  // Wagner's function is near (s + 2)/(s + 4) (Garrick, within 2 %): 0.556 at 0.5 and 0.600 at 1 semichord. Two standard deviations hold one of the two, the band of the whole both.
+  const std::string file = directory.file("indicial.csv", "semichords,indicial,indicial_std,indicial_band95,reduced_chi2\n0.5,0.556,0.01,0.03,1\n1,0.625,0.01,0.03,1\n"), output = directory.path("report.html");
+  ASSERT_EQ(run_unrig(directory, {"report", file, "-o", output}).status, 0);
+  const json agrees = page_data(output);
+  EXPECT_EQ(agrees["verdicts"][0]["tone"], "good") << agrees["verdicts"][0];
+  EXPECT_EQ(agrees["blocks"][1]["series"][0]["std"][0], 0.015) << "the page draws two of these to either side";
+  ASSERT_EQ(run_unrig(directory, {"report", directory.file("indicial.csv", "semichords,indicial,indicial_std\n0.5,0.556,0.01\n1,0.625,0.01\n"), "-o", output}).status, 0);
+  const json departs = page_data(output);
+  EXPECT_EQ(departs["verdicts"][0]["tone"], "open");
+  EXPECT_THAT(departs["verdicts"][0]["text"].get<std::string>(), HasSubstr("over 50 % of the points"));
 }
 
 TEST(Report, ShowsADiagnosis) {
