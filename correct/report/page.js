@@ -278,6 +278,24 @@
   document.getElementById('theme').addEventListener('click', () => report.setTheme(order[(order.indexOf(report.theme) + 1) % 3]));
   window.matchMedia('(prefers-color-scheme: dark)').addEventListener('change', restyle);
   window.addEventListener('resize', () => report.redraw.forEach((redraw) => redraw()));
-  window.addEventListener('beforeprint', () => { report.printing = true; restyle(); });
-  window.addEventListener('afterprint', () => { report.printing = false; restyle(); });
+  // The plots keep the width that they were drawn in, and the window's layout still stands when this is called: the body gets the paper's width first (page.css).
+  // A canvas that changes its size while a browser prepares to print prints as nothing, a new one as it is: it takes the drawing's place, in dots that paper needs.
+  const print = (printing) => {
+    report.printing = printing;
+    document.documentElement.classList.toggle('printing', printing);
+    for (const sheet of document.querySelectorAll('.sheet')) sheet.remove();
+    for (const graph of Object.values(report.graphs)) {
+      graph.updateOptions({pixelRatio: printing ? 2 : null}, true);
+      graph.resize();
+    }
+    restyle();
+    if (!printing) return;
+    for (const graph of Object.values(report.graphs)) {
+      const drawn = graph.hidden_, sheet = make('canvas', graph.graphDiv, undefined, 'sheet');
+      [sheet.width, sheet.height, sheet.style.width, sheet.style.height] = [drawn.width, drawn.height, drawn.style.width, drawn.style.height];
+      sheet.getContext('2d').drawImage(drawn, 0, 0);
+    }
+  };
+  window.addEventListener('beforeprint', () => print(true));
+  window.addEventListener('afterprint', () => print(false));
 })();
