@@ -175,6 +175,41 @@ TEST(Report, TheIndicialResponseIsComparedWithWagnersByTheBandOfTheWholeCurve) {
   EXPECT_THAT(departs["verdicts"][0]["text"].get<std::string>(), HasSubstr("over 50 % of the points"));
 }
 
+TEST(Report, AnApparentMassThatIsNotConfirmedGetsNoTick) {
+  const TemporaryDirectory directory;
+  make_results(directory);
+  const json sound = json::parse(read_text(directory.path("apparent.json")));
+  const std::string output = directory.path("report.html"), rig = sound["rig"];
+  const auto tone = [&](const json& result) {
+    EXPECT_EQ(run_unrig(directory, {"report", directory.file("changed.json", result.dump()), "--data", test::null_campaign(""), "-o", output}).status, 0);
+    return page_data(output)["verdicts"][0]["tone"].get<std::string>();
+  };
+  EXPECT_EQ(tone(sound), "good") << "what is warned of the rig file holds for every result";
+  json warned = sound;
+  warned["warnings"] = {rig + ":18: a line of the rig file", "wet_pluck.csv: the lowest mode does not decay exponentially"};
+  EXPECT_EQ(tone(warned), "open");
+  EXPECT_THAT(blocks(page_data(output), "text")[1]["text"].get<std::string>(), HasSubstr("does not decay exponentially"));
+  json joint = sound;
+  joint["joint_fit"] = {{"value", 1.1}, {"std_error", 0.3}, {"unit", "1"}, {"converged", true}, {"reduced_chi2", 2230.0}, {"agrees", false}};
+  EXPECT_EQ(tone(joint), "open");
+  joint["joint_fit"]["agrees"] = true;
+  EXPECT_EQ(tone(joint), "good");
+}
+
+TEST(Report, WritesAnErrorWithThePowerOfItsValue) {
+  const TemporaryDirectory directory;
+  make_results(directory);
+  json fit = json::parse(read_text(directory.path("fit.json")));
+  const std::vector<std::array<double, 2>> values{{2.48411e6, 5300}, {1.1219, 0.0002}, {-1.1236e8, 1.3e4}, {3, 250}, {1e-15, 2e-17}};
+  for (std::size_t k = 0; k < values.size(); ++k) fit["parameters"][k]["value"] = values[k][0], fit["parameters"][k]["std_error"] = values[k][1];
+  const std::string output = directory.path("report.html");
+  ASSERT_EQ(run_unrig(directory, {"report", directory.file("large.json", fit.dump()), "-o", output}).status, 0);
+  std::vector<std::string> written;
+  const std::vector<json> tables = blocks(page_data(output), "table");
+  for (const json& row : tables[0]["rows"]) written.push_back(row[2]);
+  EXPECT_THAT(written, ::testing::IsSupersetOf({"(2.4841 ± 0.0053)e6", "1.12190 ± 0.00020", "(-1.12360 ± 0.00013)e8", "(0.0 ± 2.5)e2", "(1.000 ± 0.020)e-15"}));
+}
+
 TEST(Report, ShowsADiagnosis) {
   const TemporaryDirectory directory;
   const std::string file = directory.file("diagnosis.json", made_up_diagnosis().dump()), output = directory.path("report.html");
@@ -187,6 +222,11 @@ TEST(Report, ShowsADiagnosis) {
   EXPECT_EQ(maps[0]["z"].size(), 3u);
   EXPECT_EQ(maps[0]["z"][2][4], 20.0);
   EXPECT_TRUE(maps[1]["z"][1][2].is_null());
+  EXPECT_THAT(maps[0]["caption"].get<std::string>(), ::testing::AllOf(HasSubstr("less weight for the runs that it cannot explain"), ::testing::Not(HasSubstr("nothing but noise")))) << "this one goes to the top";
+  json cut = made_up_diagnosis();
+  cut["improvement"]["runs"][0]["map"]["time_frequency"]["noise_above"] = true;
+  ASSERT_EQ(run_unrig(directory, {"report", directory.file("cut.json", cut.dump()), "-o", output}).status, 0);
+  EXPECT_THAT(blocks(page_data(output), "map")[0]["caption"].get<std::string>(), HasSubstr("Higher frequencies hold nothing but noise."));
   EXPECT_EQ(blocks(data, "plot").size(), 4u);
   EXPECT_EQ(blocks(data, "table").size(), 4u);
 }
