@@ -32,7 +32,7 @@
 
   function verdict(parent, v) {
     const box = make('div', parent, undefined, 'verdict ' + v.tone);
-    make('span', box, {good: '\u2713', bad: '\u2717', open: '?'}[v.tone], 'sign');
+    make('span', box, {good: '\u2713', bad: '\u2717', open: '?', told: '\u2022'}[v.tone], 'sign');
     make('span', box, v.text);
     make('small', box, v.about);
   }

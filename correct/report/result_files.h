@@ -40,6 +40,9 @@ std::string labelled(const std::string& name, const std::string& unit);
 void add_fit(ReportPage& page, const nlohmann::json& result, const std::string& path, const ReportOptions& options);
 void add_apparent_mass(ReportPage& page, const nlohmann::json& result, const std::string& path, const ReportOptions& options);
 void add_diagnosis(ReportPage& page, const nlohmann::json& result, const std::string& path, const ReportOptions& options);
+void add_trial(ReportPage& page, const nlohmann::json& result, const std::string& path);
+/// A run that `unrig simulate` wrote, beside the recording that it was simulated from where that is found.
+void add_simulated(ReportPage& page, const std::string& text, const std::string& path, const ReportOptions& options);
 void add_corrected(ReportPage& page, const std::string& text, const std::string& path);
 /// `unrig correct` on a rig that is known only as modes.
 void add_modal_load(ReportPage& page, const std::string& text, const std::string& path);

@@ -210,6 +210,53 @@ TEST(Report, WritesAnErrorWithThePowerOfItsValue) {
   EXPECT_THAT(written, ::testing::IsSupersetOf({"(2.4841 ± 0.0053)e6", "1.12190 ± 0.00020", "(-1.12360 ± 0.00013)e8", "(0.0 ± 2.5)e2", "(1.000 ± 0.020)e-15"}));
 }
 
+TEST(Report, ShowsASimulatedRunBesideItsRecording) {
+  const TemporaryDirectory directory;
+  make_results(directory);
+  const std::string simulated = directory.path("simulated.csv"), output = directory.path("report.html");
+  ASSERT_EQ(run_unrig(directory, {"simulate", "--rig", test::null_campaign("rig.toml"), "--fit", directory.path("fit.json"), "--run", test::null_campaign("step_a.csv"), "-o", simulated}).status, 0);
+  ASSERT_EQ(run_unrig(directory, {"report", simulated, "-o", output}).status, 0);
+  const json data = page_data(output);
+  EXPECT_EQ(data["verdicts"][0]["tone"], "good") << "it was fitted: the two differ by the noise. " << data["verdicts"][0];
+  const json *both = plot_titled(data, "gauge: recording and simulation"), *apart = plot_titled(data, "gauge: difference");
+  ASSERT_TRUE(both && apart);
+  const json recorded = (*both)["series"][0]["v"], model = (*both)["series"][1]["v"], difference = (*apart)["series"][0]["v"];
+  for (std::size_t k = 0; k < difference.size(); k += 100) EXPECT_NEAR(difference[k].get<double>(), recorded[k].get<double>() - model[k].get<double>(), 1e-4);  // six digits of 10 N, twice
+  EXPECT_TRUE(plot_titled(data, "circulatory: simulated")) << "which no one recorded";
+
+  // A recording that is no longer there, and a run that says of no recording.
+  std::string text = read_text(simulated);
+  const std::string from = "simulated from the run ";
+  text.replace(text.find(from) + from.size(), 1, "gone/");
+  const Finished without = run_unrig(directory, {"report", directory.file("moved.csv", text), "-o", output});
+  EXPECT_EQ(without.status, 0);
+  EXPECT_THAT(without.err, HasSubstr("step_a.csv\" is not found"));
+  EXPECT_EQ(page_data(output)["verdicts"][0]["tone"], "told");
+  EXPECT_TRUE(plot_titled(page_data(output), "gauge: simulated"));
+}
+
+TEST(Report, ShowsATrial) {
+  const TemporaryDirectory directory;
+  const auto trial = [](std::vector<std::string> hidden, std::vector<std::string> found, bool right, bool unexplained) { return json{{"hidden", hidden}, {"found", found}, {"right", right}, {"unexplained", unexplained}}; };
+  json result = {{"unrig", "trial"}, {"seed", 7}, {"noise", {{"gauge", 0.03}, {"unit", "N"}}}, {"recordings", {"a/step_a.csv"}}, {"nulls", 1}, {"false_alarms", 0}, {"wrong_names", 0}, {"misses", 2},
+                 {"confusion", {{"nothing", {{"nothing", 1}}}, {"tank-wave", {{"tank-wave", 1}, {"nothing", 1}, {"unexplained", 1}}}}},
+                 {"effects", {{{"effect", "tank-wave"}, {"hidden", 3}, {"found", 1}, {"equivalent", 0}, {"smallest_found", 4.5}, {"found_nine_in_ten_from", nullptr}}}},
+                 {"trials", {trial({}, {}, true, false), trial({"tank-wave"}, {"tank-wave"}, true, false), trial({"tank-wave"}, {}, false, false), trial({"tank-wave"}, {}, false, true)}}};
+  const std::string output = directory.path("report.html");
+  ASSERT_EQ(run_unrig(directory, {"report", directory.file("trial.json", result.dump()), "-o", output}).status, 0);
+  const json data = page_data(output);
+  EXPECT_EQ(data["verdicts"][0]["text"],
+            "Of 3 campaigns that hid something 1 was named right, 0 named an effect that was not there, 1 called unexplained and 1 not seen; no false alarm in 1 campaign that hid nothing.");
+  EXPECT_EQ(data["verdicts"][0]["tone"], "good");
+  const std::vector<json> tables = blocks(data, "table");
+  EXPECT_EQ(tables[0]["header"], json({"hidden", "nothing", "tank-wave", "unexplained"}));
+  EXPECT_EQ(tables[0]["rows"][1], json({"tank-wave", "1", "1", "1"}));
+  EXPECT_EQ(tables[1]["rows"][0], json({"tank-wave", "1", "3", "0", "4.5", "—"}));
+  result["false_alarms"] = 1;
+  ASSERT_EQ(run_unrig(directory, {"report", directory.file("trial.json", result.dump()), "-o", output}).status, 0);
+  EXPECT_EQ(page_data(output)["verdicts"][0]["tone"], "open");
+}
+
 TEST(Report, ShowsADiagnosis) {
   const TemporaryDirectory directory;
   const std::string file = directory.file("diagnosis.json", made_up_diagnosis().dump()), output = directory.path("report.html");
@@ -333,6 +380,7 @@ TEST(Report, RefusesWhatIsNoResult) {
       {directory.file("fit.json", "{\"unrig\": \"fit\"}"), "parameters"},
       {directory.file("apparent.json", "{\"unrig\": \"apparent-mass\"}"), "apparent_mass"},
       {directory.file("diagnosis.json", "{\"unrig\": \"diagnosis\"}"), "mismatch"},
+      {directory.file("trial.json", "{\"unrig\": \"trial\"}"), "trials"},
       {directory.file("types.json", bad_diagnosis.dump()), "types.json"},
       {directory.file("indicial.csv", "semichords,indicial,indicial_std\n1,0.5,0.01\n0.5,0.6,0.01\n"), "indicial.csv:3"},
       {directory.file("corrected.csv", "time [s],normal_force_std [N]\n0,1\n1,2\n"), "gauge"},
