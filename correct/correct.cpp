@@ -14,6 +14,7 @@
 #include "core/indicial_table.h"
 #include "core/rigid_load.h"
 #include "core/run_inputs.h"
+#include "correct/how_far_to_trust.h"
 #include "correct/knots.h"
 #include "correct/prior.h"
 #include "correct/restless_correction.h"
@@ -276,8 +277,7 @@ std::string too_short_for_a_limit(const Run& run, double semichords) {
 }
 
 void look_at_what_is_left(const Run& run, CorrectResult& result) {
-  constexpr double explained = 1.5;
-  if (!(result.reduced_chi2 <= explained))  // nor where it is not a number
+  if (!(result.reduced_chi2 <= HowFarToTrust::explained))  // nor where it is not a number
     result.warnings.push_back(fmt::format("{}: gauge and angle are explained to a reduced chi-square of {:.3g} only. Something is missing from the rig of the fit, or it is another rig's: `unrig diagnose` looks "
                                           "for it. The band is widened as if what is left were noise.",
                                           run.file, result.reduced_chi2));

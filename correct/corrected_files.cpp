@@ -9,6 +9,8 @@
 
 #include <fmt/format.h>
 
+#include "correct/how_far_to_trust.h"
+
 namespace unrig {
 namespace {
 
@@ -35,8 +37,9 @@ std::string to_csv(const CorrectResult& r) {
 
 void to_csv(const TextSink& sink, const CorrectResult& r) {
   std::string text = "time [s],semichords,gauge [N],normal_force [N],normal_force_std [N],circulatory [N],circulatory_std [N],cn,cn_std";
-  text += further_columns("circulatory", " [N]") + further_columns("normal_force", " [N]") + ",unexplained [N]\n";
-  sink(text);
+  text += further_columns("circulatory", " [N]") + further_columns("normal_force", " [N]") + ",unexplained [N]";
+  const HowFarToTrust trust{r.reduced_chi2, r.warnings};
+  sink(text + trust.header() + "\n");
   const CorrectedLoad &normal = r.normal_force, &circulatory = r.circulatory;
   fmt::memory_buffer row;
   auto out = std::back_inserter(row);
@@ -51,20 +54,22 @@ void to_csv(const TextSink& sink, const CorrectResult& r) {
       further_cells(out, load->by_source.row(k), load->simultaneous * load->std[k], load->half_weight[k], load->twice_weight[k]);
     row.push_back(',');
     if (std::isfinite(r.unexplained[k])) fmt::format_to(out, "{:.4g}", r.unexplained[k]);
-    row.push_back('\n');
+    fmt::format_to(out, "{}\n", trust.cells(static_cast<std::size_t>(k)));
     sink({row.data(), row.size()});
   }
 }
 
 std::string to_indicial_csv(const CorrectResult& r) {
   const IndicialResponse& response = r.indicial;
-  std::string text = "semichords,indicial,indicial_std" + further_columns("indicial", "") + ",cn_per_radian [1/rad],cn_per_radian_std [1/rad]\n";
+  std::string text = "semichords,indicial,indicial_std" + further_columns("indicial", "") + ",cn_per_radian [1/rad],cn_per_radian_std [1/rad]";
+  const HowFarToTrust trust{r.reduced_chi2, r.warnings};
+  text += trust.header() + "\n";
   auto out = std::back_inserter(text);
   for (Index i = 0; i < response.value.size(); ++i) {
     const UncertaintyBySource& u = response.uncertainty;
     fmt::format_to(out, "{:.6g},{:.6g},{:.4g}", response.semichords[i], response.value[i], u.std[i]);
     further_cells(out, u.by_source.row(i), u.simultaneous * u.std[i], response.half_weight[i], response.twice_weight[i]);
-    fmt::format_to(out, ",{:.6g},{:.4g}\n", response.per_radian[i], response.per_radian_std[i]);
+    fmt::format_to(out, ",{:.6g},{:.4g}{}\n", response.per_radian[i], response.per_radian_std[i], trust.cells(static_cast<std::size_t>(i)));
   }
   return text;
 }

@@ -6,11 +6,11 @@
 
 namespace unrig {
 
-/// `corrected.csv` (columns as in formats.md, section 4), its origin and units in leading comment lines.
+/// `corrected.csv`: columns as in formats.md, section 4, further ones behind them, the last what a reader must know (correct/how_far_to_trust.h).
 std::string to_csv(const CorrectResult& result);
 /// The same row by row, for files that are long.
 void to_csv(const TextSink& sink, const CorrectResult& result);
-/// `indicial.csv`: semichords,indicial,indicial_std.
+/// `indicial.csv`: semichords,indicial,indicial_std and further columns, likewise.
 std::string to_indicial_csv(const CorrectResult& result);
 /// What a person wants to know.
 std::string report(const CorrectResult& result);

@@ -15,6 +15,7 @@
 #include "core/motion.h"
 #include "core/response.h"
 #include "core/run_inputs.h"
+#include "correct/how_far_to_trust.h"
 #include "correct/load_smoother.h"
 
 namespace unrig {
@@ -192,8 +193,9 @@ void to_csv(const TextSink& sink, const ModalLoad& r) {
   std::string text = fmt::format("time [s],gauge [{0}],normal_force [{0}],normal_force_std [{0}]", r.unit);
   for (Index s = 0; s < sources; ++s)
     if (s != static_cast<Index>(Source::angle)) text += fmt::format(",normal_force_std_{} [{}]", source_names[static_cast<std::size_t>(s)], r.unit);
-  text += fmt::format(",normal_force_band95 [{0}],normal_force_half_weight [{0}],normal_force_twice_weight [{0}],from_inputs [{0}]\n", r.unit);
-  sink(text);
+  text += fmt::format(",normal_force_band95 [{0}],normal_force_half_weight [{0}],normal_force_twice_weight [{0}],from_inputs [{0}]", r.unit);
+  const HowFarToTrust trust{std::nan(""), r.warnings};
+  sink(text + trust.header() + "\n");
   for (Index k = 0; k < r.load.size(); ++k) {
     text.clear();
     auto out = std::back_inserter(text);
@@ -202,7 +204,7 @@ void to_csv(const TextSink& sink, const ModalLoad& r) {
     fmt::format_to(out, ",{:.6g},{:.4g}", r.load[k], r.std[k]);
     for (Index s = 0; s < sources; ++s)
       if (s != static_cast<Index>(Source::angle)) fmt::format_to(out, ",{:.3g}", r.by_source(k, s));
-    fmt::format_to(out, ",{:.4g},{:.6g},{:.6g},{:.6g}\n", r.simultaneous * r.std[k], r.half_weight[k], r.twice_weight[k], r.from_inputs[k]);
+    fmt::format_to(out, ",{:.4g},{:.6g},{:.6g},{:.6g}{}\n", r.simultaneous * r.std[k], r.half_weight[k], r.twice_weight[k], r.from_inputs[k], trust.cells(static_cast<std::size_t>(k)));
     sink(text);
   }
 }

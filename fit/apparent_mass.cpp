@@ -276,17 +276,15 @@ ApparentMassResult::JointFit joint_fit(const ApparentMassProblem& problem) {
   return joint;
 }
 
-std::string sentence(const ApparentMassResult& result) {
-  if (!result.joint_fit) return "";
-  if (!result.joint_fit->value) return fmt::format("The joint fit of both decays gives no value to compare with{}{}.", result.joint_fit->message.empty() ? "" : ": ", result.joint_fit->message);
-  const Estimate shift = result.coefficient ? *result.coefficient : result.mass, joint = *result.joint_fit->value;
-  const double difference = joint.value - shift.value, error = std::hypot(shift.std_error, joint.std_error);
-  const double percent = 100 * difference / shift.value, sigmas = std::abs(difference) / error;
-  const bool agrees = sigmas <= 3, describes = result.joint_fit->reduced_chi2 < 2;
-  std::string text = fmt::format("The joint fit of both decays {}: it differs by {:+.2g} %, {:.2g} combined standard errors", agrees ? "agrees" : "DISAGREES", percent, sigmas);
-  if (!describes) text += fmt::format(", and leaves a reduced chi-square of {:.3g}: the recordings hold something that its model leaves out", result.joint_fit->reduced_chi2);
-  if (!agrees && describes) text += ", although it describes the recordings: look for a rig file that is off";
-  return text + ".";
+std::string sentence(ApparentMassResult::JointFit& fit, const Estimate& shift) {
+  if (!fit.value) return fmt::format("The joint fit of both decays gives no value to compare with{}{}.", fit.message.empty() ? "" : ": ", fit.message);
+  const double difference = fit.value->value - shift.value, sigmas = std::abs(difference) / std::hypot(shift.std_error, fit.value->std_error);
+  const std::string apart = fmt::format("differs by {:+.2g} %, {:.2g} combined standard errors", 100 * difference / shift.value, sigmas);
+  if (!(fit.reduced_chi2 < 2))
+    return fmt::format("The joint fit of both decays confirms nothing: it leaves a reduced chi-square of {:.3g}, so that the recordings hold something that its model leaves out, and {}.", fit.reduced_chi2, apart);
+  fit.agrees = sigmas <= 3;
+  if (fit.agrees) return "The joint fit of both decays agrees: it " + apart + ".";
+  return "The joint fit of both decays DISAGREES: it " + apart + ", although it describes the recordings: look for a rig file that is off.";
 }
 
 void add_warnings(ApparentMassResult& result) {
@@ -331,7 +329,7 @@ ApparentMassResult apparent_mass(const ApparentMassProblem& problem) {
   note_oddities(result.wet);
 
   if (problem.joint_fit) result.joint_fit = joint_fit(problem);
-  result.agreement = sentence(result);
+  if (result.joint_fit) result.agreement = sentence(*result.joint_fit, result.coefficient ? *result.coefficient : result.mass);
   add_warnings(result);
   return result;
 }

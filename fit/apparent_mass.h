@@ -72,6 +72,7 @@ struct ApparentMassResult {
     bool converged = false;
     std::optional<Estimate> value;  ///< of the coefficient, or of the mass [kg] for a rig that is known only as modes
     double reduced_chi2 = 0;
+    bool agrees = false;  ///< it describes the recordings, and lies within three combined standard errors
     std::string message;  ///< where there is no value, why
   };
   std::optional<JointFit> joint_fit;

@@ -127,6 +127,7 @@ std::string to_json(const ApparentMassResult& r) {
     out["joint_fit"]["unit"] = r.method == ApparentMassMethod::mode_shapes ? "1" : r.mass_unit;
     out["joint_fit"]["converged"] = r.joint_fit->converged;
     out["joint_fit"]["reduced_chi2"] = number(r.joint_fit->reduced_chi2);
+    out["joint_fit"]["agrees"] = r.joint_fit->agrees;
     if (!r.joint_fit->message.empty()) out["joint_fit"]["message"] = r.joint_fit->message;
     out["agreement"] = r.agreement;
   }

@@ -18,6 +18,7 @@
 #include "core/units.h"
 #include "fit/fit_files.h"
 #include "fit/shaft_motion.h"
+#include "fit/simulated_run.h"
 
 namespace unrig {
 namespace {
@@ -205,7 +206,7 @@ int simulate_command(int argc, char** argv) {
   const SimulateResult result = simulate(problem);
   for (const std::string& warning : result.warnings) warn(warning);
   progress("writing " + options.output);
-  write_text(options.output, [&](const TextSink& sink) { run_text(sink, result.run, recipe(problem)); });
+  write_text(options.output, [&](const TextSink& sink) { run_text(sink, result.run, SimulatedRun{problem.run.file, recipe(problem)}.remarks()); });
   progress.clear();
   print_summary(problem, result, options.output);
   print_comparison(problem.run, result);

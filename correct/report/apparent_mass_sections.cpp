@@ -20,6 +20,14 @@ std::string estimate(const json& result, const char* key) {
   return with_error(number_of(e, "value"), number_of(e, "std_error"));
 }
 
+/// Open where the recordings are not what the method takes them for, or the joint fit does not confirm it. What the rig file is warned of holds for every result of it.
+Tone tone_of(const json& result) {
+  const std::string rig = text_of(result, "rig") + ":";
+  for (const json& warning : result.value("warnings", json::array()))
+    if (warning.is_string() && !warning.get<std::string>().starts_with(rig)) return Tone::open;
+  return result.contains("joint_fit") && !result["joint_fit"].value("agrees", false) ? Tone::open : Tone::good;
+}
+
 void add_modes(ReportPage& page, const json& result) {
   std::vector<std::vector<std::string>> rows;
   for (const char* which : {"dry", "wet"}) {
@@ -75,8 +83,10 @@ void add_apparent_mass(ReportPage& page, const json& result, const std::string& 
   const double theory = number_of(result.value("theory", json::object()), "value");
   std::string text = fmt::format("The fluid adds {} {}", estimate(result, "apparent_mass"), unit);
   if (std::isfinite(theory)) text += fmt::format(", {} times the theory's {:.4g} {} (π ρ b²)", estimate(result, "apparent_mass_coefficient"), theory, unit);
-  page.add_verdict(Tone::good, text + ".", name);
+  const Tone tone = tone_of(result);
+  page.add_verdict(tone, text + (tone == Tone::good ? "." : ". See what is said of it below."), name);
   page.add_section("Apparent mass: " + name);
+  add_warnings(page, result);
   std::vector<std::vector<std::string>> rows{{"apparent mass", estimate(result, "apparent_mass"), unit}};
   if (std::isfinite(theory)) rows.push_back({"theory, π ρ b²", plain(theory, 6), unit});
   rows.push_back({"coefficient (over theory)", estimate(result, "apparent_mass_coefficient"), ""});

@@ -5,6 +5,7 @@
 
 #include "core/csv_table.h"
 #include "core/wagner.h"
+#include "correct/how_far_to_trust.h"
 #include "correct/report/result_files.h"
 
 namespace unrig {
@@ -13,13 +14,18 @@ namespace {
 using Eigen::Index;
 using Eigen::VectorXd;
 
-/// The column, in the unit of the file. Throws InputError where it is absent or holds text.
-const CsvColumn& column(const CsvTable& table, const char* name) {
+/// The column, in the unit of the file; null where it is absent. Throws InputError where it holds text.
+const CsvColumn* find(const CsvTable& table, const std::string& name) {
   for (const CsvColumn& c : table.columns) {
     if (c.name != name) continue;
     if (!c.text.empty()) throw InputError({table.file, c.text_line}, fmt::format("the column \"{}\" holds \"{}\"", name, c.text), "wanted numbers", "");
-    return c;
+    return &c;
   }
+  return nullptr;
+}
+
+const CsvColumn& column(const CsvTable& table, const char* name) {
+  if (const CsvColumn* found = find(table, name)) return *found;
   throw InputError({table.file, table.header_line}, fmt::format("no column \"{}\"", name), "wanted a file that `unrig correct` wrote", "");
 }
 
@@ -30,6 +36,34 @@ const VectorXd& increasing(const CsvTable& table, const CsvColumn& c) {
       throw InputError(table.place(k), fmt::format("\"{}\" is {} after {}", c.name, c.value[k], k > 0 ? c.value[k - 1] : std::nan("")), "wanted increasing numbers", "");
   if (c.value.size() < 2) throw InputError({table.file, table.header_line}, fmt::format("{} rows", c.value.size()), "wanted at least two", "");
   return c.value;
+}
+
+/// How many standard deviations the band has to either side: as many as hold the whole curve with 95 %, where the table says how many these are; otherwise two.
+double band_factor(const CsvTable& table, const std::string& name) {
+  const CsvColumn *band = find(table, name + "_band95"), *std = find(table, name + "_std");
+  Index k = 0;
+  const double most = std && std->value.size() > 0 ? std->value.maxCoeff(&k) : 0;
+  return band && most > 0 && band->value[k] > 0 ? band->value[k] / most : 2;
+}
+
+/// The page draws two of `std` to either side.
+VectorXd band_of(const VectorXd& std, double factor) { return std * (factor / 2); }
+
+std::string caption_of_band(double factor) {
+  return factor == 2 ? "The band is two standard deviations at each point." : fmt::format("The band, {:.2f} standard deviations, holds the whole curve with 95 %.", factor);
+}
+
+/// The verdict in the tone of what a reader must know first.
+void add_verdict(ReportPage& page, const HowFarToTrust& trust, Tone tone, const std::string& text, const std::string& about) {
+  if (trust.reduced_chi2 > HowFarToTrust::explained)
+    return page.add_verdict(Tone::bad, fmt::format("Not to be trusted: gauge and angle are explained to a reduced chi-square of {} only. {}", plain(trust.reduced_chi2, 3), text), about);
+  if (trust.is_wrong()) return page.add_verdict(Tone::bad, fmt::format("Not to be trusted: {}. {}", HowFarToTrust::wrong, text), about);
+  if (!trust.warnings.empty()) return page.add_verdict(Tone::open, text + " See the warnings below.", about);
+  page.add_verdict(tone, text, about);
+}
+
+void add_warnings(ReportPage& page, const HowFarToTrust& trust) {
+  for (const std::string& warning : trust.warnings) page.add_text("Warning: " + warning);
 }
 
 }  // namespace
@@ -44,19 +78,29 @@ void add_corrected(ReportPage& page, const std::string& text, const std::string&
   const Index last = t.size() - 1;
   const double dt = (t[last] - t[0]) / static_cast<double>(last);
 
-  page.add_verdict(Tone::good,
-                   fmt::format("A rigid rig would have felt a circulatory load of {} {} at the end of the record, after {} {} before the motion.",
-                               with_error(circulatory.value[last], circulatory_std.value[last]), load.unit, plain(circulatory.value[0], 4), load.unit),
-                   name);
+  const HowFarToTrust trust = HowFarToTrust::of_table(table, text);
+  const bool is_told = std::isfinite(trust.reduced_chi2) || !trust.warnings.empty();
+  add_verdict(page, trust, is_told ? Tone::good : Tone::open,
+              fmt::format("A rigid rig would have felt a circulatory load of {} {} at the end of the record, after {} {} before the motion.", with_error(circulatory.value[last], circulatory_std.value[last]),
+                          load.unit, plain(circulatory.value[0], 4), load.unit),
+              name);
   page.add_section("Correction: " + name);
+  add_warnings(page, trust);
+  page.add_text(is_told ? fmt::format("Gauge and angle are explained to a reduced chi-square of {}; 1 is their noise.", plain(trust.reduced_chi2, 4))
+                        : "Warning: the file does not say how well gauge and angle are explained: `unrig correct` of an earlier version wrote it. Correct the run again.");
+  const double of_load = band_factor(table, "normal_force"), of_circulatory = band_factor(table, "circulatory");
   page.add_plot({"Gauge and the load of a rigid rig", time_label, labelled("load", load.unit), t,
-                 {{"gauge reading", 0, gauge.value}, {"rigid-rig load", 1, load.value, load_std.value}}, name,
-                 "The gauge reads the equivalent force at the calibration station, the load is the whole normal force: even at rest they differ by the ratio of their levers.", false, false, 320});
+                 {{"gauge reading", 0, gauge.value}, {"rigid-rig load", 1, load.value, band_of(load_std.value, of_load)}}, name,
+                 "The gauge reads the equivalent force at the calibration station, the load is the whole normal force: even at rest they differ by the ratio of their levers. " + caption_of_band(of_load), false,
+                 false, 320});
+  if (const CsvColumn* left = find(table, "unexplained"))
+    page.add_plot({"Residual of the gauge", time_label, labelled("recording − model", left->unit), t, {{"residual", 1, left->value}}, name,
+                   "What neither the load nor the rig's answer to it accounts for. More than noise here is missing from the load above.", false, false, 180, {}, gauge.value});
   page.add_plot({"Gauge and the circulatory part of the load", time_label, labelled("load", circulatory.unit), t,
-                 {{"gauge reading", 0, gauge.value}, {"circulatory load", 2, circulatory.value, circulatory_std.value}}, name});
+                 {{"gauge reading", 0, gauge.value}, {"circulatory load", 2, circulatory.value, band_of(circulatory_std.value, of_circulatory)}}, name, caption_of_band(of_circulatory)});
   const CsvColumn &cn = column(table, "cn"), &cn_std = column(table, "cn_std");
   page.add_plot({"Normal-force coefficient", "time [semichords since the motion began]", "C_N", increasing(table, column(table, "semichords")),
-                 {{"C_N", 1, cn.value, cn_std.value}}});
+                 {{"C_N", 1, cn.value, band_of(cn_std.value, of_load)}}, "", caption_of_band(of_load)});
   add_spectra(page, "Spectra before and after the correction", dt, load.unit, {"gauge reading", 0, gauge.value}, {"rigid-rig load", 1, load.value, {}, true},
               "Amplitude of the whole record, mean removed, Hann window. What the rig adds stands in the reading only.");
 }
@@ -70,17 +114,20 @@ void add_modal_load(ReportPage& page, const std::string& text, const std::string
   const double dt = (t[t.size() - 1] - t[0]) / static_cast<double>(t.size() - 1);
   const auto rms = [](const VectorXd& x) { return std::sqrt(x.array().isFinite().select(x.array().square(), 0).sum() / static_cast<double>(std::max<Index>(1, x.array().isFinite().count()))); };
 
-  page.add_verdict(Tone::good,
-                   fmt::format("A rigid rig that does not move would have read {} {} r.m.s., give or take {}; the gauge reads {}, of which the measured inputs account for {}.", plain(rms(load.value), 4),
-                               load.unit, plain(rms(load_std.value), 2), plain(rms(gauge.value), 4), plain(rms(inputs.value), 4)),
-                   name);
+  const HowFarToTrust trust = HowFarToTrust::of_table(table, text);
+  add_verdict(page, trust, Tone::good,
+              fmt::format("A rigid rig that does not move would have read {} {} r.m.s., give or take {}; the gauge reads {}, of which the measured inputs account for {}.", plain(rms(load.value), 4), load.unit,
+                          plain(rms(load_std.value), 2), plain(rms(gauge.value), 4), plain(rms(inputs.value), 4)),
+              name);
   page.add_section("Correction: " + name);
-  page.add_plot({"Gauge and the load of a rigid rig", time_label, labelled("reading", load.unit), t, {{"gauge reading", 0, gauge.value}, {"rigid-rig load", 1, load.value, load_std.value}}, name,
-                 "The rig is known only as modes: the load is what the gauge would read of it if the rig were rigid and its mount at rest.", false, false, 320});
+  add_warnings(page, trust);
+  const double of_load = band_factor(table, "normal_force");
+  page.add_plot({"Gauge and the load of a rigid rig", time_label, labelled("reading", load.unit), t, {{"gauge reading", 0, gauge.value}, {"rigid-rig load", 1, load.value, band_of(load_std.value, of_load)}}, name,
+                 "The rig is known only as modes: the load is what the gauge would read of it if the rig were rigid and its mount at rest. " + caption_of_band(of_load), false, false, 320});
   page.add_plot({"Gauge and what the measured inputs do to it", time_label, labelled("reading", gauge.unit), t,
                  {{"gauge reading", 0, gauge.value}, {"from the measured inputs", 2, inputs.value}}, name, "Inputs are the motion of the mount and a measured force."});
-  page.add_plot({"The load alone", time_label, labelled("load", load.unit), t, {{"rigid-rig load", 1, load.value, load_std.value}}, name,
-                 "With its band, on a scale of its own. It is smoothed as far as the noise demands: what is faster than its bandwidth is left out."});
+  page.add_plot({"The load alone", time_label, labelled("load", load.unit), t, {{"rigid-rig load", 1, load.value, band_of(load_std.value, of_load)}}, name,
+                 "With its band, on a scale of its own. The load is smoothed as far as the noise demands: what is faster than its bandwidth is left out."});
   add_spectra(page, "Spectra before and after the correction", dt, load.unit, {"gauge reading", 0, gauge.value}, {"reading less what the inputs do", 1, gauge.value - inputs.value},
               "Amplitude of the whole record, mean removed, Hann window. What stands out of both is a load, or a mode that the rig file does not have.");
 }
@@ -93,22 +140,27 @@ void add_indicial(ReportPage& page, const std::string& text, const std::string& 
   while (first < s.size() && !(s[first] > 0)) ++first;  // the axis is logarithmic
   const Index rows = s.size() - first;
   const VectorXd x = s.tail(rows), wagners = x.unaryExpr([](double at) { return wagner_exact(at); });
-  const VectorXd off = (value.tail(rows) - wagners).cwiseQuotient(std.tail(rows));
+  const double factor = band_factor(table, "indicial");
   Index within = 0, known = 0;
   for (Index k = 0; k < rows; ++k) {
-    if (!(std[first + k] > 0) || !std::isfinite(off[k])) continue;
+    const double off = (value[first + k] - wagners[k]) / std[first + k];
+    if (!(std[first + k] > 0) || !std::isfinite(off)) continue;
     ++known;
-    if (std::abs(off[k]) <= 2) ++within;
+    if (std::abs(off) <= factor) ++within;
   }
   if (known == 0) throw InputError({path, 1}, "no row has a standard deviation", "wanted an indicial response that `unrig correct --indicial` wrote", "");
-  const double share = static_cast<double>(within) / static_cast<double>(known);
-  const std::string name = file_name(path);
-  page.add_verdict(Tone::open,
-                   fmt::format("The indicial response lies within its 95 % band of Wagner's function over {:.0f} % of the points from {:.3g} to {:.3g} semichords.", 100 * share, x[0], x[rows - 1]), name);
+  const std::string name = file_name(path), range = fmt::format("from {:.3g} to {:.3g} semichords", x[0], x[rows - 1]);
+  const HowFarToTrust trust = HowFarToTrust::of_table(table, text);
+  if (within == known)
+    add_verdict(page, trust, Tone::good, fmt::format("The indicial response agrees with Wagner's function, which lies within its 95 % band all the way {}.", range), name);
+  else
+    add_verdict(page, trust, Tone::open,
+                fmt::format("The indicial response departs from Wagner's function, which lies within its 95 % band over {:.0f} % of the points {}.", 100 * static_cast<double>(within) / static_cast<double>(known), range), name);
   page.add_section("Indicial response: " + name);
+  add_warnings(page, trust);
   page.add_plot({"Indicial response against Wagner's", "distance since the step [semichords]", "response over its limit", x,
-                 {{"estimated", 1, value.tail(rows), std.tail(rows)}, {"Wagner (exact)", 0, wagners, {}, true}}, "",
-                 "Nothing in the estimate assumes Wagner's shape. The band is two standard deviations at each distance; neighbouring points move together.", true, false, 340});
+                 {{"estimated", 1, value.tail(rows), band_of(std.tail(rows), factor)}, {"Wagner (exact)", 0, wagners, {}, true}}, "",
+                 "Nothing in the estimate assumes Wagner's shape. " + caption_of_band(factor) + " Neighbouring points move together.", true, false, 340});
 }
 
 }  // namespace unrig

@@ -18,6 +18,9 @@ using Eigen::Index;
 using Eigen::VectorXd;
 using nlohmann::json;
 
+/// What "before" is in a diagnosis (fit/diagnose/diagnose.h).
+constexpr const char* rig_alone = "the rig with nothing added, fitted with less weight for the runs that it cannot explain";
+
 json member(const json& object, const char* key, json otherwise) { return object.is_object() && object.contains(key) && !object[key].is_null() ? object[key] : otherwise; }
 
 std::vector<double> doubles(const json& values) {
@@ -84,7 +87,8 @@ void add_ranking(ReportPage& page, const json& ranking) {
   std::vector<std::vector<std::string>> rows;
   for (const json& r : ranking)
     rows.push_back({text_of(r, "effect"), plain(number_of(r, "score"), 4), plain(number_of(r, "reduced_chi2"), 4), plain(number_of(r, "delta_bic"), 5), plain(number_of(r, "probability"), 3)});
-  if (!rows.empty()) page.add_table("Ranking of the effects", {"effect", "score", "reduced chi-square", "change of BIC", "probability"}, rows, "The more negative the change of BIC, the more the effect explains for its parameters.");
+  if (!rows.empty()) page.add_table("Ranking of the effects", {"effect", "score", "reduced chi-square", "change of BIC", "probability"}, rows, "Score: the share of the excess of chi-square that one linear step in the effect's parameters promised to remove, which decided what was fitted in full; 0 for what joined the search later. "
+                   "The more negative the change of BIC, the more the effect explains for its parameters.");
 }
 
 void add_missing(ReportPage& page, const json& missing, const std::string& title) {
@@ -127,7 +131,7 @@ void add_improvement(ReportPage& page, const json& improvement) {
   }
   if (rows.empty()) return;
   page.add_table("Residuals before and after", {"run", "", "before (r.m.s.)", "after (r.m.s.)", "noise (std)", "unit", "before / noise", "after / noise"}, rows,
-                 fmt::format("BIC {} before, {} after.", plain(number_of(improvement, "bic_before"), 7), plain(number_of(improvement, "bic_after"), 7)));
+                 fmt::format("Before: {}. `unrig fit` gives all runs their full weight and may leave less of these, and more of the others. BIC {} before, {} after.", rig_alone, plain(number_of(improvement, "bic_before"), 7), plain(number_of(improvement, "bic_after"), 7)));
 }
 
 void add_time_frequency(ReportPage& page, const json& map) {
@@ -146,7 +150,8 @@ void add_time_frequency(ReportPage& page, const json& map) {
       heat.z[j][i] = z.is_number() ? z.get<double>() : std::nan("");
     }
   heat.log_z = true;
-  heat.caption = "Of the best model with nothing added. Higher frequencies hold nothing but noise.";
+  heat.caption = fmt::format("Of {}.", rig_alone);
+  if (member(map, "noise_above", false).get<bool>()) heat.caption += " Higher frequencies hold nothing but noise.";
   page.add_map(heat);
 }
 
@@ -158,7 +163,7 @@ void add_restoring_force(ReportPage& page, const json& map) {
   const bool grid = !z.empty() && z.front().is_array();
   if (z.empty() || (grid ? z.size() != y.size() : z.size() != x.size() || z.size() != y.size())) return page.add_text("Warning: the restoring-force map is incomplete and left out.");
   if (grid) {
-    HeatMap heat{"What the model lacks, by the state of the rig", x_label, y_label, z_label, doubles(x), doubles(y), {}, "Mean over cells of displacement and velocity of the first normal mode, in the best model with nothing added; grey where the rig never was.", false, true};
+    HeatMap heat{"What the model lacks, by the state of the rig", x_label, y_label, z_label, doubles(x), doubles(y), {}, fmt::format("Mean over cells of displacement and velocity of the first normal mode, of {}; grey where the rig never was.", rig_alone), false, true};
     for (const json& row : z) heat.z.push_back(doubles(row));
     return page.add_map(heat);
   }
@@ -171,7 +176,7 @@ void add_restoring_force(ReportPage& page, const json& map) {
   }
 }
 
-/// A channel of a run: the recording, the best model with nothing added and the one with what was found.
+/// A channel of a run: the recording, the model with nothing added and the one with what was found.
 struct DiagnosedTrace {
   std::string channel, unit;
   VectorXd time, measured, before, after, force, force_std;

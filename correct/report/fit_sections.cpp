@@ -61,10 +61,11 @@ void add_runs(ReportPage& page, const json& runs) {
     for (const json& c : channels) {
       const double left = number_of(c, "rms_residual"), noise = number_of(c, "noise");
       rows.push_back({file_name(text_of(run, "file")), text_of(c, "name"), plain(number_of(c, "samples"), 9), plain(left, 4), plain(noise, 4), text_of(c, "unit"), plain(left / noise, 3),
-                      plain(number_of(run, "reduced_chi2"), 4), plain(number_of(run, "whiteness"), 2)});
+                      &c == &channels.front() ? plain(number_of(run, "reduced_chi2"), 4) : "", &c == &channels.front() ? plain(number_of(run, "whiteness"), 2) : ""});
     }
   }
-  page.add_table("Recordings", {"run", "channel", "samples", "residual (r.m.s.)", "noise (std)", "unit", "ratio", "reduced chi-square", "white with probability"}, rows);
+  page.add_table("Recordings", {"run", "channel", "samples", "residual (r.m.s.)", "noise (std)", "unit", "ratio", "reduced chi-square", "white with probability"}, rows,
+                 "Reduced chi-square and the test for white noise are of all channels of a run together.");
 }
 
 void add_correlations(ReportPage& page, const json& fit) {
@@ -120,8 +121,7 @@ void add_fit(ReportPage& page, const json& result, const std::string& path, cons
   add_parameters(page, result["parameters"]);
   page.add_text("Standard errors: " + text_of(result, "standard_errors") + ".");
   if (!fit.effects.empty()) page.add_text(fmt::format("Physics beyond the rig at work: {}.", fmt::join(fit.effects, ", ")));
-  for (const json& warning : result.value("warnings", json::array()))
-    if (warning.is_string()) page.add_text("Warning: " + warning.get<std::string>());
+  add_warnings(page, result);
   const json runs = result.value("runs", json::array());
   add_runs(page, runs);
   add_correlations(page, result);

@@ -32,7 +32,7 @@
 
   function verdict(parent, v) {
     const box = make('div', parent, undefined, 'verdict ' + v.tone);
-    make('span', box, {good: '\u2713', bad: '\u2717', open: '?'}[v.tone], 'sign');
+    make('span', box, {good: '\u2713', bad: '\u2717', open: '?', told: '\u2022'}[v.tone], 'sign');
     make('span', box, v.text);
     make('small', box, v.about);
   }
@@ -40,7 +40,7 @@
   function table(parent, block) {
     if (block.title) make('h3', parent, block.title);
     const t = make('table', make('div', parent, undefined, 'scroll'));
-    const numeric = block.header.map((_, c) => block.rows.length > 0 && block.rows.every((row) => /^[-+\u2212\u2014\d]/.test(row[c] || '\u2014')));
+    const numeric = block.header.map((_, c) => block.rows.length > 0 && block.rows.every((row) => /^\(?[-+\u2212\u2014\d]/.test(row[c] || '\u2014')));
     const head = make('tr', make('thead', t));
     block.header.forEach((name, c) => make('th', head, name, numeric[c] ? 'number' : '').scope = 'col');
     const body = make('tbody', t);
@@ -278,6 +278,24 @@
   document.getElementById('theme').addEventListener('click', () => report.setTheme(order[(order.indexOf(report.theme) + 1) % 3]));
   window.matchMedia('(prefers-color-scheme: dark)').addEventListener('change', restyle);
   window.addEventListener('resize', () => report.redraw.forEach((redraw) => redraw()));
-  window.addEventListener('beforeprint', () => { report.printing = true; restyle(); });
-  window.addEventListener('afterprint', () => { report.printing = false; restyle(); });
+  // The plots keep the width that they were drawn in, and the window's layout still stands when this is called: the body gets the paper's width first (page.css).
+  // A canvas that changes its size while a browser prepares to print prints as nothing, a new one as it is: it takes the drawing's place, in dots that paper needs.
+  const print = (printing) => {
+    report.printing = printing;
+    document.documentElement.classList.toggle('printing', printing);
+    for (const sheet of document.querySelectorAll('.sheet')) sheet.remove();
+    for (const graph of Object.values(report.graphs)) {
+      graph.updateOptions({pixelRatio: printing ? 2 : null}, true);
+      graph.resize();
+    }
+    restyle();
+    if (!printing) return;
+    for (const graph of Object.values(report.graphs)) {
+      const drawn = graph.hidden_, sheet = make('canvas', graph.graphDiv, undefined, 'sheet');
+      [sheet.width, sheet.height, sheet.style.width, sheet.style.height] = [drawn.width, drawn.height, drawn.style.width, drawn.style.height];
+      sheet.getContext('2d').drawImage(drawn, 0, 0);
+    }
+  };
+  window.addEventListener('beforeprint', () => print(true));
+  window.addEventListener('afterprint', () => print(false));
 })();

@@ -8,13 +8,14 @@
 #include "core/given_files.h"
 #include "core/text_file.h"
 #include "correct/report/result_files.h"
+#include "fit/simulated_run.h"
 
 namespace unrig {
 namespace {
 
 using nlohmann::json;
 
-constexpr const char* wanted = "wanted what `unrig fit`, `apparent-mass`, `diagnose` or `correct` wrote with -o or --indicial";
+constexpr const char* wanted = "wanted what `unrig fit`, `apparent-mass`, `diagnose`, `trial`, `correct` or `simulate` wrote with -o or --indicial";
 
 void add_json(ReportPage& page, const std::string& text, const std::string& path, const ReportOptions& options) {
   const json result = json::parse(text, nullptr, false);
@@ -24,6 +25,7 @@ void add_json(ReportPage& page, const std::string& text, const std::string& path
     if (kind == "fit") return add_fit(page, result, path, options);
     if (kind == "apparent-mass") return add_apparent_mass(page, result, path, options);
     if (kind == "diagnosis") return add_diagnosis(page, result, path, options);
+    if (kind == "trial") return add_trial(page, result, path);
   } catch (const json::exception& e) {
     throw InputError({path, 0}, e.what(), wanted, "");
   }
@@ -36,7 +38,8 @@ void add_result(ReportPage& page, const std::string& path, const ReportOptions& 
   if (header.starts_with("semichords,indicial")) return add_indicial(page, text, path);
   if (header.find(",from_inputs") != std::string::npos) return add_modal_load(page, text, path);
   if (header.find("normal_force_std") != std::string::npos) return add_corrected(page, text, path);
-  throw InputError({path, 1}, "neither JSON nor the header of a corrected record or an indicial response", wanted, "A recording itself is drawn with the fit.json that it belongs to.");
+  if (simulated_run(text)) return add_simulated(page, text, path, options);
+  throw InputError({path, 1}, "neither JSON nor a simulated run nor the header of a corrected record or an indicial response", wanted, "A recording itself is drawn with the fit.json that it belongs to.");
 }
 
 }  // namespace
@@ -46,7 +49,7 @@ int report_command(int argc, char** argv) {
   std::vector<std::string> results;
   std::string output, title;
   ReportOptions options;
-  app.add_option("results", results, "fit.json, apparent.json, diagnosis.json, corrected.csv, indicial.csv, in any number and order")->required();
+  app.add_option("results", results, "fit.json, apparent.json, diagnosis.json, trial.json, corrected.csv, indicial.csv, simulated.csv, in any number and order")->required();
   app.add_option("-o,--output", output, "report (HTML)")->required();
   app.add_option("--data", options.data_folder, "folder of the recordings and the rig, where they are no longer at the paths that the results name");
   app.add_option("--title", title, "title of the page, in place of the files' names");

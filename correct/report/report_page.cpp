@@ -71,7 +71,7 @@ Stretch stretch_of(const Plot& plot, Index first, Index last) {
   return stretch;
 }
 
-const char* name_of(Tone tone) { return tone == Tone::good ? "good" : tone == Tone::bad ? "bad" : "open"; }
+const char* name_of(Tone tone) { return tone == Tone::good ? "good" : tone == Tone::bad ? "bad" : tone == Tone::open ? "open" : "told"; }
 
 }  // namespace
 

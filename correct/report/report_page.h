@@ -8,8 +8,8 @@
 
 namespace unrig {
 
-/// How a verdict stands: explained, contradicted, or open.
-enum class Tone { good, bad, open };
+/// How a verdict stands: explained, contradicted, or open; told, where there is nothing to hold it against.
+enum class Tone { good, bad, open, told };
 
 /// A curve of a plot. Colours count through a palette that colour-blind readers can tell apart: 0 for what was measured, then the model's.
 struct Curve {

@@ -33,8 +33,12 @@ std::string plain(double x, int digits) { return std::isfinite(x) ? fmt::format(
 std::string with_error(double value, double std_error) {
   if (!std::isfinite(value)) return "—";
   if (!(std_error > 0) || !std::isfinite(std_error)) return plain(value, 6);
-  const int decimals = 1 - static_cast<int>(std::floor(std::log10(std_error)));
-  if (decimals < 0 || decimals > 12) return fmt::format("{:.6g} ± {:.2g}", value, std_error);
+  const auto power_of = [](double x) { return static_cast<int>(std::floor(std::log10(x))); };
+  const int decimals = 1 - power_of(std_error), power = power_of(std::max(std::abs(value), std_error));
+  if (decimals < 0 || decimals > 12) {
+    const double scale = std::pow(10.0, power);
+    return fmt::format("({:.{}f} ± {:.{}f})e{}", value / scale, decimals + power, std_error / scale, decimals + power, power);
+  }
   return fmt::format("{:.{}f} ± {:.{}f}", value, decimals, std_error, decimals);
 }
 
@@ -44,6 +48,11 @@ double number_of(const json& object, const char* key) {
 
 std::string text_of(const json& object, const char* key) {
   return object.contains(key) && object[key].is_string() ? object[key].get<std::string>() : "";
+}
+
+void add_warnings(ReportPage& page, const json& result) {
+  for (const json& warning : result.value("warnings", json::array()))
+    if (warning.is_string()) page.add_text("Warning: " + warning.get<std::string>());
 }
 
 std::string labelled(const std::string& name, const std::string& unit) { return unit.empty() || unit == "1" ? name : name + " [" + unit + "]"; }

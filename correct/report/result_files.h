@@ -21,13 +21,16 @@ std::optional<std::string> found_file(const std::string& recorded, const std::st
 /// The file's name without folders.
 std::string file_name(const std::string& path);
 
-/// "1.1219 ± 0.0002": the value with two digits of its error; without an error six digits.
+/// "1.1219 ± 0.0002": the value with two digits of its error, large and small numbers over one power of ten, "(2.4841 ± 0.0053)e6"; without an error six digits.
 std::string with_error(double value, double std_error);
 /// A number of a result, NaN where it is absent or null.
 double number_of(const nlohmann::json& object, const char* key);
 std::string text_of(const nlohmann::json& object, const char* key);
 /// Up to `digits` digits, an em dash where it is not finite.
 std::string plain(double x, int digits = 5);
+
+/// The `warnings` of a result, as texts of the section.
+void add_warnings(ReportPage& page, const nlohmann::json& result);
 
 /// "time [s]"; no brackets where the unit is none.
 std::string labelled(const std::string& name, const std::string& unit);
@@ -37,6 +40,9 @@ std::string labelled(const std::string& name, const std::string& unit);
 void add_fit(ReportPage& page, const nlohmann::json& result, const std::string& path, const ReportOptions& options);
 void add_apparent_mass(ReportPage& page, const nlohmann::json& result, const std::string& path, const ReportOptions& options);
 void add_diagnosis(ReportPage& page, const nlohmann::json& result, const std::string& path, const ReportOptions& options);
+void add_trial(ReportPage& page, const nlohmann::json& result, const std::string& path);
+/// A run that `unrig simulate` wrote, beside the recording that it was simulated from where that is found.
+void add_simulated(ReportPage& page, const std::string& text, const std::string& path, const ReportOptions& options);
 void add_corrected(ReportPage& page, const std::string& text, const std::string& path);
 /// `unrig correct` on a rig that is known only as modes.
 void add_modal_load(ReportPage& page, const std::string& text, const std::string& path);

@@ -47,7 +47,7 @@ struct MissingEffect {
   std::vector<FittedParameter> parameters;
 };
 
-/// A channel of a run before and after the effects that were found; of a run that was not fitted its first fitted channel.
+/// A channel of a run before and after the effects that were found, before: what `Diagnosis::before` leaves, a fit with runs that it cannot explain weighted down; of a run that was not fitted its first fitted channel.
 struct ImprovedRun {
   std::string file, channel, unit;
   bool heldout = false;   ///< not fitted but predicted

@@ -40,7 +40,7 @@ ordered_json rows(const Eigen::MatrixXd& values) {
 
 /// "map": power over bands and windows, and of a run with a mismatch the missing force over velocities and displacements.
 ordered_json map_json(const ResidualMaps& m) {
-  ordered_json map = {{"channel", m.channel}, {"time_frequency", {{"time", list(m.time_frequency.time)}, {"frequency", list(m.time_frequency.frequency)}, {"power", rows(m.time_frequency.power)}, {"unit", "noise = 1"}}}};
+  ordered_json map = {{"channel", m.channel}, {"time_frequency", {{"time", list(m.time_frequency.time)}, {"frequency", list(m.time_frequency.frequency)}, {"power", rows(m.time_frequency.power)}, {"unit", "noise = 1"}, {"noise_above", m.time_frequency.noise_above}}}};
   if (m.force)
     map["restoring_force"] = {{"displacement", list(m.force->displacement)}, {"displacement_unit", m.force->displacement_unit}, {"velocity", list(m.force->velocity)}, {"velocity_unit", m.force->velocity_unit},
                               {"force", rows(m.force->force)}, {"force_unit", m.force->force_unit}};
@@ -158,7 +158,7 @@ std::string report(const Diagnosis& d) {
   for (const MissingForce& f : d.missing_force)
     text += fmt::format("    what is left of {} would be explained by a force of {:.3g} N r.m.s. at the calibration element, known to {:.2g} N (diagnosis file: missing_force)\n",
                         base_name(f.run), std::sqrt(f.value.squaredNorm() / static_cast<double>(f.value.size())), f.standard_deviation);
-  text += "[[Improvement]]\n";
+  text += "[[Improvement]] r.m.s. of the residual: the rig alone, fitted with less weight for runs that it cannot explain -> with what was found\n";
   for (const ImprovedRun& r : d.runs)
     text += fmt::format("    {:<20} {:<8} {:9.4g} -> {:9.4g} {} (noise {:.4g})\n", base_name(r.file) + (r.channel == "gauge" ? "" : ": " + r.channel), kind_of(r), r.rms_before, r.rms_after, r.unit, r.noise);
   if (std::any_of(d.runs.begin(), d.runs.end(), [](const ImprovedRun& r) { return r.aside; }))

@@ -43,7 +43,7 @@ TimeFrequencyMap time_frequency(const VectorXd& x, double start, double dt, Inde
   constexpr double above_noise = 20;  // exceeded by chance by exp(-20) of the powers
   const Index length = std::min(x.size(), std::max<Index>(32, x.size() / 6)), step = std::max<Index>(1, (x.size() - length) / std::max<Index>(1, columns - 1));
   const Index windows = 1 + (x.size() - length) / step, lines = (length - 1) / 2;  // without line 0 and, of an even length, the last: noise of another kind
-  TimeFrequencyMap map{VectorXd(windows), {}, {}};
+  TimeFrequencyMap map{VectorXd(windows), {}, {}, false};
   if (lines < 4) return map;
   MatrixXd power(lines, windows);
   double spacing = 0;
@@ -56,6 +56,7 @@ TimeFrequencyMap time_frequency(const VectorXd& x, double start, double dt, Inde
   Index highest = lines;  // nothing stands out above it
   while (highest > 1 && power.row(highest - 1).maxCoeff() < above_noise) --highest;
   const Index shown = highest <= 1 ? lines : std::min(lines, highest + highest / 4 + 8);
+  map.noise_above = shown < lines;
   map.frequency = grouped(VectorXd::LinSpaced(shown, spacing, spacing * static_cast<double>(shown)), most_bands);
   map.power.resize(map.frequency.size(), windows);
   for (Index w = 0; w < windows; ++w) map.power.col(w) = grouped(power.col(w).head(shown), most_bands);

@@ -13,6 +13,7 @@ struct TimeFrequencyMap {
   Eigen::VectorXd time;       ///< s, the windows' middles
   Eigen::VectorXd frequency;  ///< Hz, the bands' middles
   Eigen::MatrixXd power;      ///< bands x windows
+  bool noise_above = false;   ///< what lies above the highest band is left out: nothing stands out of the noise there
 };
 
 /// About `columns` windows, and at most `most_bands` bands of averaged lines, up to where lines stand out of the noise (everything where none do). `start`, `dt` [s].

@@ -60,7 +60,7 @@ std::string growth(const std::vector<double>& swing, const std::vector<double>& 
   const double spread = u.matrix().norm() * v.matrix().norm(), slope = (u * v).sum() / u.square().sum();
   constexpr double clearly = 0.9, fastest = 0.25;
   if (!(spread > 0) || (u * v).sum() / spread < clearly || slope < fastest) return "";
-  return fmt::format("; from run to run it grows with the {:.2g}th power of what the gauge swings", slope);
+  return fmt::format("; from run to run it grows {} what the gauge swings", in_words_of_power(slope));
 }
 
 /// "82 % of the excess of step_a.csv lies between 13 and 17 Hz, from 1.0 to 1.4 s (0 to 3 semichords after the motion begins)".
@@ -86,6 +86,14 @@ std::string describe(const RunResidual& run, const VectorXd& left, Mismatch& mis
 }
 
 }  // namespace
+
+std::string in_words_of_power(double exponent) {
+  constexpr double close = 0.15;
+  if (std::abs(exponent - 1) < close) return "in proportion to";
+  if (std::abs(exponent - 2) < close) return "with the square of";
+  if (std::abs(exponent - 3) < close) return "with the cube of";
+  return fmt::format("with the power {:.2g} of", exponent);
+}
 
 Mismatch locate_mismatch(const JointProblem& joint) {
   Mismatch mismatch;

@@ -29,6 +29,9 @@ struct Mismatch {
   std::string summary;
 };
 
+/// "in proportion to", "with the square of", "with the power 1.4 of".
+std::string in_words_of_power(double exponent);
+
 /// Runs that are set aside are not asked. Energy: residual power against the white part of the residual itself, estimated from differences, which do not see a smooth mismatch. Colour: Bartlett's test of the
 /// cumulative periodogram. A mismatch is found where the p-value, corrected for the number of channels, is below 1e-3 and the residual's power exceeds the noise's
 /// by more than 5 %: a motion that is known to its noise leaves up to that.

@@ -76,6 +76,16 @@ std::string replaced(std::string text, const std::string& what, const std::strin
   return text.replace(at, what.size(), by);
 }
 
+/// Chromium's exit status; what it prints goes to `out`, what the page says on its console to `log`.
+int browse(const std::string& browser, const TemporaryDirectory& directory, const std::string& page, const std::string& options, const std::string& out, const std::string& log) {
+  // --no-zygote: as a daemon's child Chromium otherwise waits for a zygote that never answers. It must not find a network either.
+  const std::string command = "HOME=" + directory.path("") + " timeout 200 " + browser +
+                              " --headless --no-sandbox --no-zygote --disable-gpu --disable-dev-shm-usage --no-first-run --disable-background-networking"
+                              " --disable-component-update --host-resolver-rules='MAP * ~NOTFOUND' --enable-logging=stderr"
+                              " --user-data-dir=" + directory.path("profile") + " " + options + " file://" + page + " >" + out + " 2>" + log;
+  return std::system(command.c_str());
+}
+
 TEST(ReportInABrowser, LoadsDrawsAndZooms) {
   const std::string browser = chromium();
   if (browser.empty()) GTEST_SKIP() << "no Chromium on this machine; sample_data/setup.sh --optional installs it";
@@ -86,12 +96,7 @@ TEST(ReportInABrowser, LoadsDrawsAndZooms) {
   std::string page = read_text(report);
   page = replaced(page, "<meta charset=\"utf-8\">", std::string("<meta charset=\"utf-8\">") + listen);
   const std::string probed = directory.file("probed.html", replaced(page, "</body>", probe)), dom = directory.path("dom.html"), log = directory.path("log.txt");
-  // --no-zygote: as a daemon's child Chromium otherwise waits for a zygote that never answers. It must not find a network either.
-  const std::string command = "HOME=" + directory.path("") + " timeout 200 " + browser +
-                              " --headless --no-sandbox --no-zygote --disable-gpu --disable-dev-shm-usage --no-first-run --disable-background-networking"
-                              " --disable-component-update --host-resolver-rules='MAP * ~NOTFOUND' --window-size=1200,900 --enable-logging=stderr"
-                              " --user-data-dir=" + directory.path("profile") + " --dump-dom file://" + probed + " >" + dom + " 2>" + log;
-  ASSERT_EQ(std::system(command.c_str()), 0) << read_text(log);
+  ASSERT_EQ(browse(browser, directory, probed, "--window-size=1200,900 --dump-dom", dom, log), 0) << read_text(log);
   const std::string text = read_text(dom);
   const std::size_t first = text.find("FOUND{"), last = text.rfind("}END");
   ASSERT_TRUE(first != std::string::npos && last != std::string::npos) << text.substr(0, 2000) << read_text(log);
@@ -123,6 +128,56 @@ TEST(ReportInABrowser, LoadsDrawsAndZooms) {
   EXPECT_EQ(found["printed"], found["light"]);
   ASSERT_EQ(found["maps"].size(), 2u);
   for (const json& colours : found["maps"]) EXPECT_GT(colours, 6) << "a map of fewer colours than values";
+}
+
+/// Behind the page's own script: what stands on the paper, plot by plot, and what stands in the window again after it.
+constexpr const char* look_at_paper = R"(<script>
+for (const moment of ['beforeprint', 'afterprint']) window.addEventListener(moment, () => {
+  const plots = Object.values(unrigReport.graphs).map((graph) => {
+    const sheet = graph.graphDiv.querySelector('.sheet'), drawn = sheet || graph.hidden_, tenth = Math.floor(drawn.width / 10);
+    const pixels = drawn.getContext('2d').getImageData(drawn.width - tenth, 0, tenth, drawn.height).data;
+    let ink = 0;
+    for (let i = 3; i < pixels.length; i += 4) if (pixels[i] > 0) ++ink;
+    return {sheet: !!sheet, dots: drawn.width, box: graph.maindiv_.clientWidth, canvas: graph.hidden_.clientWidth, end_of_axis: graph.toDomXCoord(graph.xAxisRange()[1]), ink};
+  });
+  console.log('FOUND' + JSON.stringify({moment, plots}) + 'END');
+});
+</script></body>)";
+
+TEST(ReportInABrowser, PrintsWholePlotsFromAWideWindow) {
+  const std::string browser = chromium();
+  if (browser.empty()) GTEST_SKIP() << "no Chromium on this machine; sample_data/setup.sh --optional installs it";
+  const TemporaryDirectory directory;
+  const std::string report = directory.path("report.html"), pdf = directory.path("report.pdf"), log = directory.path("log.txt");
+  ASSERT_EQ(test::run_unrig(directory, {"report", directory.file("diagnosis.json", test::made_up_diagnosis().dump()), "-o", report}).status, 0);
+  const std::string probed = directory.file("probed.html", replaced(read_text(report), "</body>", look_at_paper));
+  ASSERT_EQ(browse(browser, directory, probed, "--window-size=1920,1080 --print-to-pdf=" + pdf, directory.path("out.txt"), log), 0) << read_text(log);
+  std::vector<json> moments;
+  const std::string said = read_text(log);
+  for (std::size_t at = said.find("FOUND{"); at != std::string::npos; at = said.find("FOUND{", at + 1)) moments.push_back(json::parse(said.substr(at + 5, said.find("}END", at) - at - 4)));
+  ASSERT_EQ(moments.size(), 2u) << said;
+  constexpr double narrowest_paper = (210 - 2 * 10) / 25.4 * 96;  // A4 with margins of 1 cm, in CSS pixels
+  ASSERT_EQ(moments[0]["moment"], "beforeprint");
+  ASSERT_EQ(moments[0]["plots"].size(), 4u);
+  for (const json& plot : moments[0]["plots"]) {
+    EXPECT_EQ(plot["sheet"], true);
+    EXPECT_EQ(plot["canvas"], plot["box"]) << plot;
+    EXPECT_EQ(plot["dots"].get<double>(), 2 * plot["box"].get<double>()) << plot;
+    EXPECT_LE(plot["box"].get<double>(), narrowest_paper) << plot;
+    EXPECT_LE(plot["end_of_axis"].get<double>(), plot["box"].get<double>()) << plot;
+    EXPECT_GT(plot["ink"], 100) << "nothing at the end of the axis: " << plot;
+  }
+  EXPECT_EQ(moments[1]["moment"], "afterprint");
+  for (const json& plot : moments[1]["plots"]) {
+    EXPECT_EQ(plot["sheet"], false);
+    EXPECT_GT(plot["canvas"].get<double>(), 1000) << plot;
+    EXPECT_EQ(plot["canvas"], plot["box"]) << plot;
+  }
+  // In the file itself they stand as pictures; what Chromium loses is not there.
+  const std::string file = read_text(pdf), picture = "/Width " + std::to_string(moments[0]["plots"][0]["dots"].get<int>());
+  std::size_t pictures = 0;
+  for (std::size_t at = file.find(picture); at != std::string::npos; at = file.find(picture, at + 1)) ++pictures;
+  EXPECT_GE(pictures, 4u);
 }
 
 }  // namespace

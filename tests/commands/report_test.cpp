@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <array>
 #include <cmath>
 #include <cstdint>
 #include <filesystem>
@@ -122,6 +123,140 @@ TEST(Report, ShowsALoadOnARigThatIsKnownOnlyAsModes) {
   ASSERT_TRUE(plot_titled(data, "Spectra before and after the correction"));
 }
 
+TEST(Report, ACorrectionThatIsWrongGetsNoTick) {
+  const TemporaryDirectory directory;
+  make_results(directory);
+  // Friction acts in this campaign; the fit knows of none.
+  const std::string run = test::source_path("sample_data/campaigns/friction/step_a.csv"), corrected = directory.path("wrong.csv"), indicial = directory.path("wrong_indicial.csv");
+  const Finished finished = run_unrig(directory, {"correct", "--rig", test::null_campaign("rig.toml"), "--fit", directory.path("fit.json"), run, "-o", corrected, "--indicial", indicial});
+  ASSERT_EQ(finished.status, 0) << finished.err;
+  ASSERT_THAT(finished.err, HasSubstr("Something is missing from the rig of the fit"));
+  const std::string output = directory.path("report.html");
+  ASSERT_EQ(run_unrig(directory, {"report", corrected, indicial, "-o", output}).status, 0);
+  const json data = page_data(output);
+  for (const json& verdict : data["verdicts"]) {
+    EXPECT_EQ(verdict["tone"], "bad") << verdict;
+    EXPECT_THAT(verdict["text"].get<std::string>(), ::testing::StartsWith("Not to be trusted: gauge and angle are explained to a reduced chi-square of ")) << verdict;
+  }
+  std::size_t warnings = 0;
+  for (const json& text : blocks(data, "text")) warnings += text["text"].get<std::string>().find("Something is missing from the rig of the fit") != std::string::npos ? 1 : 0;
+  EXPECT_EQ(warnings, 2u) << "one in each section";
+  const json* residual = plot_titled(data, "Residual of the gauge");
+  ASSERT_TRUE(residual);
+  EXPECT_EQ((*residual)["group"], (*plot_titled(data, "Gauge and the load of a rigid rig"))["group"]) << "zooms with the load";
+}
+
+TEST(Report, TheToneOfACorrectionFollowsItsWarnings) {
+  const TemporaryDirectory directory;
+  const std::string columns = "time [s],semichords,gauge [N],normal_force [N],normal_force_std [N],circulatory [N],circulatory_std [N],cn,cn_std";
+  const std::vector<std::array<std::string, 4>> tables{{",reduced_chi2", ",1.02", ",1.02", "good"},
+                                                       {",reduced_chi2,warning", ",1.02,a.csv: 3 samples are missing", ",1.02,", "open"},
+                                                       {",reduced_chi2,warning", ",1.02,a.csv: Load and response are wrong.", ",1.02,", "bad"},
+                                                       {",reduced_chi2", ",1.6", ",1.6", "bad"},
+                                                       {"", "", "", "open"}};
+  for (const auto& [header, first, second, tone] : tables) {
+    const std::string file = directory.file("corrected.csv", columns + header + "\n0,0,1,1,0.1,1,0.1,1,0.1" + first + "\n1,1,1,1,0.1,1,0.1,1,0.1" + second + "\n"), output = directory.path("report.html");
+    ASSERT_EQ(run_unrig(directory, {"report", file, "-o", output}).status, 0);
+    EXPECT_EQ(page_data(output)["verdicts"][0]["tone"], tone) << header << first;
+  }
+}
+
+TEST(Report, TheIndicialResponseIsComparedWithWagnersByTheBandOfTheWholeCurve) {
+  const TemporaryDirectory directory;
+  // Wagner's function is near (s + 2)/(s + 4) (Garrick, within 2 %): 0.556 at 0.5 and 0.600 at 1 semichord. Two standard deviations hold one of the two, the band of the whole both.
+  const std::string file = directory.file("indicial.csv", "semichords,indicial,indicial_std,indicial_band95,reduced_chi2\n0.5,0.556,0.01,0.03,1\n1,0.625,0.01,0.03,1\n"), output = directory.path("report.html");
+  ASSERT_EQ(run_unrig(directory, {"report", file, "-o", output}).status, 0);
+  const json agrees = page_data(output);
+  EXPECT_EQ(agrees["verdicts"][0]["tone"], "good") << agrees["verdicts"][0];
+  EXPECT_EQ(agrees["blocks"][1]["series"][0]["std"][0], 0.015) << "the page draws two of these to either side";
+  ASSERT_EQ(run_unrig(directory, {"report", directory.file("indicial.csv", "semichords,indicial,indicial_std\n0.5,0.556,0.01\n1,0.625,0.01\n"), "-o", output}).status, 0);
+  const json departs = page_data(output);
+  EXPECT_EQ(departs["verdicts"][0]["tone"], "open");
+  EXPECT_THAT(departs["verdicts"][0]["text"].get<std::string>(), HasSubstr("over 50 % of the points"));
+}
+
+TEST(Report, AnApparentMassThatIsNotConfirmedGetsNoTick) {
+  const TemporaryDirectory directory;
+  make_results(directory);
+  const json sound = json::parse(read_text(directory.path("apparent.json")));
+  const std::string output = directory.path("report.html"), rig = sound["rig"];
+  const auto tone = [&](const json& result) {
+    EXPECT_EQ(run_unrig(directory, {"report", directory.file("changed.json", result.dump()), "--data", test::null_campaign(""), "-o", output}).status, 0);
+    return page_data(output)["verdicts"][0]["tone"].get<std::string>();
+  };
+  EXPECT_EQ(tone(sound), "good") << "what is warned of the rig file holds for every result";
+  json warned = sound;
+  warned["warnings"] = {rig + ":18: a line of the rig file", "wet_pluck.csv: the lowest mode does not decay exponentially"};
+  EXPECT_EQ(tone(warned), "open");
+  EXPECT_THAT(blocks(page_data(output), "text")[1]["text"].get<std::string>(), HasSubstr("does not decay exponentially"));
+  json joint = sound;
+  joint["joint_fit"] = {{"value", 1.1}, {"std_error", 0.3}, {"unit", "1"}, {"converged", true}, {"reduced_chi2", 2230.0}, {"agrees", false}};
+  EXPECT_EQ(tone(joint), "open");
+  joint["joint_fit"]["agrees"] = true;
+  EXPECT_EQ(tone(joint), "good");
+}
+
+TEST(Report, WritesAnErrorWithThePowerOfItsValue) {
+  const TemporaryDirectory directory;
+  make_results(directory);
+  json fit = json::parse(read_text(directory.path("fit.json")));
+  const std::vector<std::array<double, 2>> values{{2.48411e6, 5300}, {1.1219, 0.0002}, {-1.1236e8, 1.3e4}, {3, 250}, {1e-15, 2e-17}};
+  for (std::size_t k = 0; k < values.size(); ++k) fit["parameters"][k]["value"] = values[k][0], fit["parameters"][k]["std_error"] = values[k][1];
+  const std::string output = directory.path("report.html");
+  ASSERT_EQ(run_unrig(directory, {"report", directory.file("large.json", fit.dump()), "-o", output}).status, 0);
+  std::vector<std::string> written;
+  const std::vector<json> tables = blocks(page_data(output), "table");
+  for (const json& row : tables[0]["rows"]) written.push_back(row[2]);
+  EXPECT_THAT(written, ::testing::IsSupersetOf({"(2.4841 ± 0.0053)e6", "1.12190 ± 0.00020", "(-1.12360 ± 0.00013)e8", "(0.0 ± 2.5)e2", "(1.000 ± 0.020)e-15"}));
+}
+
+TEST(Report, ShowsASimulatedRunBesideItsRecording) {
+  const TemporaryDirectory directory;
+  make_results(directory);
+  const std::string simulated = directory.path("simulated.csv"), output = directory.path("report.html");
+  ASSERT_EQ(run_unrig(directory, {"simulate", "--rig", test::null_campaign("rig.toml"), "--fit", directory.path("fit.json"), "--run", test::null_campaign("step_a.csv"), "-o", simulated}).status, 0);
+  ASSERT_EQ(run_unrig(directory, {"report", simulated, "-o", output}).status, 0);
+  const json data = page_data(output);
+  EXPECT_EQ(data["verdicts"][0]["tone"], "good") << "it was fitted: the two differ by the noise. " << data["verdicts"][0];
+  const json *both = plot_titled(data, "gauge: recording and simulation"), *apart = plot_titled(data, "gauge: difference");
+  ASSERT_TRUE(both && apart);
+  const json recorded = (*both)["series"][0]["v"], model = (*both)["series"][1]["v"], difference = (*apart)["series"][0]["v"];
+  for (std::size_t k = 0; k < difference.size(); k += 100) EXPECT_NEAR(difference[k].get<double>(), recorded[k].get<double>() - model[k].get<double>(), 1e-4);  // six digits of 10 N, twice
+  EXPECT_TRUE(plot_titled(data, "circulatory: simulated")) << "which no one recorded";
+
+  // A recording that is no longer there, and a run that says of no recording.
+  std::string text = read_text(simulated);
+  const std::string from = "simulated from the run ";
+  text.replace(text.find(from) + from.size(), 1, "gone/");
+  const Finished without = run_unrig(directory, {"report", directory.file("moved.csv", text), "-o", output});
+  EXPECT_EQ(without.status, 0);
+  EXPECT_THAT(without.err, HasSubstr("step_a.csv\" is not found"));
+  EXPECT_EQ(page_data(output)["verdicts"][0]["tone"], "told");
+  EXPECT_TRUE(plot_titled(page_data(output), "gauge: simulated"));
+}
+
+TEST(Report, ShowsATrial) {
+  const TemporaryDirectory directory;
+  const auto trial = [](std::vector<std::string> hidden, std::vector<std::string> found, bool right, bool unexplained) { return json{{"hidden", hidden}, {"found", found}, {"right", right}, {"unexplained", unexplained}}; };
+  json result = {{"unrig", "trial"}, {"seed", 7}, {"noise", {{"gauge", 0.03}, {"unit", "N"}}}, {"recordings", {"a/step_a.csv"}}, {"nulls", 1}, {"false_alarms", 0}, {"wrong_names", 0}, {"misses", 2},
+                 {"confusion", {{"nothing", {{"nothing", 1}}}, {"tank-wave", {{"tank-wave", 1}, {"nothing", 1}, {"unexplained", 1}}}}},
+                 {"effects", {{{"effect", "tank-wave"}, {"hidden", 3}, {"found", 1}, {"equivalent", 0}, {"smallest_found", 4.5}, {"found_nine_in_ten_from", nullptr}}}},
+                 {"trials", {trial({}, {}, true, false), trial({"tank-wave"}, {"tank-wave"}, true, false), trial({"tank-wave"}, {}, false, false), trial({"tank-wave"}, {}, false, true)}}};
+  const std::string output = directory.path("report.html");
+  ASSERT_EQ(run_unrig(directory, {"report", directory.file("trial.json", result.dump()), "-o", output}).status, 0);
+  const json data = page_data(output);
+  EXPECT_EQ(data["verdicts"][0]["text"],
+            "Of 3 campaigns that hid something 1 was named right, 0 named an effect that was not there, 1 called unexplained and 1 not seen; no false alarm in 1 campaign that hid nothing.");
+  EXPECT_EQ(data["verdicts"][0]["tone"], "good");
+  const std::vector<json> tables = blocks(data, "table");
+  EXPECT_EQ(tables[0]["header"], json({"hidden", "nothing", "tank-wave", "unexplained"}));
+  EXPECT_EQ(tables[0]["rows"][1], json({"tank-wave", "1", "1", "1"}));
+  EXPECT_EQ(tables[1]["rows"][0], json({"tank-wave", "1", "3", "0", "4.5", "—"}));
+  result["false_alarms"] = 1;
+  ASSERT_EQ(run_unrig(directory, {"report", directory.file("trial.json", result.dump()), "-o", output}).status, 0);
+  EXPECT_EQ(page_data(output)["verdicts"][0]["tone"], "open");
+}
+
 TEST(Report, ShowsADiagnosis) {
   const TemporaryDirectory directory;
   const std::string file = directory.file("diagnosis.json", made_up_diagnosis().dump()), output = directory.path("report.html");
@@ -134,6 +269,11 @@ TEST(Report, ShowsADiagnosis) {
   EXPECT_EQ(maps[0]["z"].size(), 3u);
   EXPECT_EQ(maps[0]["z"][2][4], 20.0);
   EXPECT_TRUE(maps[1]["z"][1][2].is_null());
+  EXPECT_THAT(maps[0]["caption"].get<std::string>(), ::testing::AllOf(HasSubstr("less weight for the runs that it cannot explain"), ::testing::Not(HasSubstr("nothing but noise")))) << "this one goes to the top";
+  json cut = made_up_diagnosis();
+  cut["improvement"]["runs"][0]["map"]["time_frequency"]["noise_above"] = true;
+  ASSERT_EQ(run_unrig(directory, {"report", directory.file("cut.json", cut.dump()), "-o", output}).status, 0);
+  EXPECT_THAT(blocks(page_data(output), "map")[0]["caption"].get<std::string>(), HasSubstr("Higher frequencies hold nothing but noise."));
   EXPECT_EQ(blocks(data, "plot").size(), 4u);
   EXPECT_EQ(blocks(data, "table").size(), 4u);
 }
@@ -240,6 +380,7 @@ TEST(Report, RefusesWhatIsNoResult) {
       {directory.file("fit.json", "{\"unrig\": \"fit\"}"), "parameters"},
       {directory.file("apparent.json", "{\"unrig\": \"apparent-mass\"}"), "apparent_mass"},
       {directory.file("diagnosis.json", "{\"unrig\": \"diagnosis\"}"), "mismatch"},
+      {directory.file("trial.json", "{\"unrig\": \"trial\"}"), "trials"},
       {directory.file("types.json", bad_diagnosis.dump()), "types.json"},
       {directory.file("indicial.csv", "semichords,indicial,indicial_std\n1,0.5,0.01\n0.5,0.6,0.01\n"), "indicial.csv:3"},
       {directory.file("corrected.csv", "time [s],normal_force_std [N]\n0,1\n1,2\n"), "gauge"},

@@ -106,6 +106,7 @@ TEST(ApparentMass, AgreesWithTheJointFitWhereNothingIsHidden) {
   EXPECT_EQ(out["unrig"], "apparent-mass");
   EXPECT_EQ(out["method"], "mode shapes");
   EXPECT_EQ(out["apparent_mass"]["unit"], "kg/m");
+  EXPECT_EQ(out["joint_fit"]["agrees"], true);
   for (const char* run : {"dry", "wet"}) {
     EXPECT_EQ(out[run]["unit"], "Hz");
     EXPECT_GT(out[run]["std_error"], 0);
@@ -113,6 +114,15 @@ TEST(ApparentMass, AgreesWithTheJointFitWhereNothingIsHidden) {
   }
   EXPECT_NEAR(out["dry"]["damping_ratio"], key("null")["zeta_n"], 1e-4);
   EXPECT_THAT(report(result), testing::HasSubstr("The wet mode is not the dry mode with more mass"));
+}
+
+TEST(ApparentMass, AJointFitThatDoesNotDescribeTheDecaysConfirmsNothing) {
+  const ApparentMassResult result = apparent_mass(problem_of("friction", true));
+  ASSERT_TRUE(result.joint_fit && result.joint_fit->value);
+  EXPECT_GT(result.joint_fit->reduced_chi2, 100);
+  EXPECT_FALSE(result.joint_fit->agrees);
+  EXPECT_THAT(result.agreement, testing::HasSubstr("confirms nothing: it leaves a reduced chi-square of "));
+  EXPECT_FALSE(json::parse(to_json(result))["joint_fit"]["agrees"].get<bool>());
 }
 
 TEST(ApparentMass, ErrorsFromModeShapesCoverTheTruth) {

@@ -26,6 +26,7 @@ TEST(Maps, WhiteNoiseHasAPowerOfOneEverywhere) {
   EXPECT_NEAR(map.power.mean(), 1, 0.065);
   EXPECT_NEAR(map.time.mean(), 3 + 0.002 * 5999 / 2, 0.02) << "the windows lie evenly over the record, but for a step";
   EXPECT_GT(map.frequency.maxCoeff(), 240) << "where nothing stands out, all is shown";
+  EXPECT_FALSE(map.noise_above);
 }
 
 TEST(Maps, AToneStandsWhereItSounds) {
@@ -39,6 +40,7 @@ TEST(Maps, AToneStandsWhereItSounds) {
   EXPECT_GT(map.time[window], 4 + 1);  // the window of 2 s lies inside the tone
   EXPECT_LT(map.time[window], 8 - 1);
   EXPECT_LT(map.frequency.maxCoeff(), 25) << "only noise above";
+  EXPECT_TRUE(map.noise_above);
   EXPECT_LT(map.power.col(0).maxCoeff(), 20) << "not yet there";
 }
 

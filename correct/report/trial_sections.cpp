@@ -1,0 +1,84 @@
+#include <set>
+
+#include <fmt/format.h>
+
+#include "correct/report/result_files.h"
+
+namespace unrig {
+namespace {
+
+using nlohmann::json;
+
+struct Counts {
+  int hidden = 0, right = 0, silent = 0, unexplained = 0, failed = 0;
+};
+
+/// Of the campaigns that hid something.
+Counts counts_of(const json& trials) {
+  Counts n;
+  for (const json& trial : trials) {
+    if (trial.contains("failure")) {
+      ++n.failed;
+      continue;
+    }
+    if (trial.at("hidden").empty()) continue;
+    ++n.hidden;
+    n.right += trial.at("right").get<bool>() ? 1 : 0;
+    if (!trial.at("found").empty()) continue;
+    n.silent += trial.at("unexplained").get<bool>() ? 0 : 1;
+    n.unexplained += trial.at("unexplained").get<bool>() ? 1 : 0;
+  }
+  return n;
+}
+
+std::string campaigns(int count) { return fmt::format("{} campaign{}", count, count == 1 ? "" : "s"); }
+
+void add_confusion(ReportPage& page, const json& confusion) {
+  std::set<std::string> found;
+  for (const json& row : confusion)
+    for (const auto& [name, count] : row.items()) found.insert(name);
+  std::vector<std::string> header{"hidden"};
+  header.insert(header.end(), found.begin(), found.end());
+  std::vector<std::vector<std::string>> rows;
+  for (const auto& [hidden, row] : confusion.items()) {
+    rows.push_back({hidden});
+    for (const std::string& name : found) rows.back().push_back(row.contains(name) ? plain(number_of(row, name.c_str()), 9) : "");
+  }
+  page.add_table("What was hidden, and what was found", header, rows, "Campaigns with what the row hides, by what the diagnosis named. \"nothing\" in a row of an effect: not seen.");
+}
+
+void add_sizes(ReportPage& page, const json& effects) {
+  std::vector<std::vector<std::string>> rows;
+  for (const json& e : effects)
+    rows.push_back({text_of(e, "effect"), plain(number_of(e, "found"), 9), plain(number_of(e, "hidden"), 9), plain(number_of(e, "equivalent"), 9), plain(number_of(e, "smallest_found"), 3),
+                    plain(number_of(e, "found_nine_in_ten_from"), 3)});
+  page.add_table("How large an effect must be", {"effect", "found", "hidden", "named as good", "least found", "nine in ten found from"}, rows,
+                 "Sizes: the largest r.m.s. that the effect makes in a run, over the noise of the gauge. Named as good: the diagnosis said that these runs cannot tell it from what it named.");
+}
+
+void add_failures(ReportPage& page, const json& trials) {
+  for (const json& trial : trials)
+    if (const std::string failure = text_of(trial, "failure"); !failure.empty()) page.add_text("Warning: a campaign failed: " + failure);
+}
+
+}  // namespace
+
+void add_trial(ReportPage& page, const json& result, const std::string& path) {
+  const json &trials = result.at("trials"), &noise = result.at("noise");
+  const Counts n = counts_of(trials);
+  const int nulls = result.at("nulls").get<int>(), alarms = result.at("false_alarms").get<int>(), wrong = result.at("wrong_names").get<int>();
+  page.add_verdict(alarms == 0 && wrong == 0 && n.failed == 0 ? Tone::good : Tone::open,
+                   fmt::format("Of {} that hid something {} {} named right, {} named an effect that was not there, {} called unexplained and {} not seen; {} in {} that hid nothing.", campaigns(n.hidden), n.right,
+                               n.right == 1 ? "was" : "were", wrong, n.unexplained, n.silent, alarms == 0 ? "no false alarm" : fmt::format("{} false alarm{}", alarms, alarms == 1 ? "" : "s"), campaigns(nulls)),
+                   file_name(path));
+  page.add_section("Trial: " + file_name(path));
+  std::string like;
+  for (const json& recording : result.value("recordings", json::array())) like += (like.empty() ? "runs like " : ", ") + file_name(recording.get<std::string>());
+  page.add_text(fmt::format("Simulated campaigns with {}, a noise of {} {} and the random numbers of seed {}.", like.empty() ? "two plucks and three steps" : like, plain(number_of(noise, "gauge"), 4),
+                            text_of(noise, "unit"), result.at("seed").dump()));
+  add_confusion(page, result.at("confusion"));
+  add_sizes(page, result.at("effects"));
+  add_failures(page, trials);
+}
+
+}  // namespace unrig

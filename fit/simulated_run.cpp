@@ -1,0 +1,41 @@
+#include "fit/simulated_run.h"
+
+#include <algorithm>
+#include <array>
+
+namespace unrig {
+namespace {
+
+constexpr std::string_view remark = "# # ", simulated = "simulated with the rig ", of = "simulated from the run ";
+
+}  // namespace
+
+std::vector<std::string> SimulatedRun::remarks() const {
+  std::vector<std::string> lines = recipe;
+  lines.insert(lines.begin() + 1, std::string(of) + of_run);
+  return lines;
+}
+
+std::optional<SimulatedRun> simulated_run(std::string_view text) {
+  SimulatedRun run;
+  while (text.starts_with('#')) {
+    std::string_view line = text.substr(0, text.find('\n'));
+    text.remove_prefix(std::min(text.size(), line.size() + 1));
+    if (line.ends_with('\r')) line.remove_suffix(1);
+    if (!line.starts_with(remark)) continue;
+    line.remove_prefix(remark.size());
+    if (line.starts_with(of))
+      run.of_run = line.substr(of.size());
+    else
+      run.recipe.emplace_back(line);
+  }
+  if (run.recipe.empty() || !run.recipe.front().starts_with(simulated)) return std::nullopt;
+  return run;
+}
+
+bool is_input(std::string_view channel) {
+  constexpr std::array<std::string_view, 5> inputs{"alpha", "force", "mount_velocity", "mount_acceleration", "weight"};
+  return std::find(inputs.begin(), inputs.end(), channel) != inputs.end();
+}
+
+}  // namespace unrig
