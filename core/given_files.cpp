@@ -39,6 +39,8 @@ bool same_file(const std::string& a, const std::string& b) {
 
 void check_outputs(const std::vector<Output>& outputs, const std::vector<std::string>& inputs) {
   for (const Output& output : outputs)
+    if (output.path == "-") throw InputError({output.option, 0}, "\"-\" names no file", "wanted a file: standard output takes the summary", "Write /dev/stdout for a result behind the summary there, or ./- for a file of that name.");
+  for (const Output& output : outputs)
     // Into /dev/stdout and its like one may write after another.
     if (!output.path.empty() && !output.path.starts_with("/dev/") && !output.path.starts_with("/proc/")) check_output(output, outputs, inputs);
   for (const Output& output : outputs)

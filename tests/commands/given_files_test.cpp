@@ -94,6 +94,15 @@ TEST_F(GivenFiles, AnOutputWithoutAFolderIsRefusedBeforeAnythingIsComputed) {
   EXPECT_FALSE(std::filesystem::exists(out));
 }
 
+TEST_F(GivenFiles, ADashIsNoOutput) {
+  const std::string out = directory_.path("out");
+  const std::vector<std::string> parts{": \"-\" names no file; wanted a file: standard output takes the summary", "/dev/stdout"};
+  refused({"simulate", "--rig", rig_, "--run", step_, "-o", "-"}, step_, parts);
+  refused({"report", fit_, "-o", "-"}, fit_, parts);
+  refused({"correct", "--rig", rig_, "--fit", fit_, step_, "-o", out, "--indicial", "-"}, fit_, {"--indicial: \"-\" names no file"});
+  EXPECT_FALSE(std::filesystem::exists("-"));
+}
+
 TEST_F(GivenFiles, ARecordingCountsOnce) {
   const std::string out = directory_.path("out"), link = directory_.path("link.csv"), detour = directory_.path("./wet_pluck.csv");
   std::filesystem::create_symlink(wet_, link);

@@ -27,4 +27,8 @@ done
 if command -v bash >/dev/null; then
   found=$(bash -c '. "$1/share/bash-completion/completions/unrig"; COMP_WORDS=("$1/bin/unrig" fit --r) COMP_CWORD=2; _unrig; echo "${COMPREPLY[*]}"' bash "$build/installed")
   [ "$found" = --rig ] || { echo "completion of --r gives '$found'" >&2; exit 1; }
+  found=$(bash -c '. "$1/share/bash-completion/completions/unrig"; COMP_WORDS=("$1/bin/unrig" fit --effect tank) COMP_CWORD=3; _unrig; echo "${COMPREPLY[*]}"' bash "$build/installed")
+  [ "$found" = tank-wave ] || { echo "completion of --effect tank gives '$found'" >&2; exit 1; }
+  found=$(bash -c '. "$1/share/bash-completion/completions/unrig"; COMP_WORDS=("$1/bin/unrig" trial --effects tank-wave,mains) COMP_CWORD=3; _unrig; echo "${COMPREPLY[*]}"' bash "$build/installed")
+  [ "$found" = tank-wave,mains-hum ] || { echo "completion of --effects tank-wave,mains gives '$found'" >&2; exit 1; }
 fi
