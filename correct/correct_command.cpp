@@ -3,11 +3,14 @@
 #include <CLI/CLI.hpp>
 #include <fmt/format.h>
 
+#include <cmath>
+
 #include "core/command.h"
 #include "core/given_files.h"
 #include "core/text_file.h"
 #include "correct/correct.h"
 #include "correct/corrected_files.h"
+#include "correct/how_far_to_trust.h"
 #include "correct/modal_load.h"
 
 namespace unrig {
@@ -21,7 +24,7 @@ int finish(const Result& result, const std::string& output, Progress& progress) 
   write_text(output, [&](const TextSink& sink) { to_csv(sink, result); });
   progress.clear();
   fmt::print("{}", report(result));
-  return exit_done;
+  return HowFarToTrust{std::nan(""), result.warnings}.is_wrong() ? exit_no_answer : exit_done;
 }
 
 }  // namespace

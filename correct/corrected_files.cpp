@@ -40,6 +40,7 @@ void to_csv(const TextSink& sink, const CorrectResult& r) {
   text += further_columns("circulatory", " [N]") + further_columns("normal_force", " [N]") + ",unexplained [N]";
   const HowFarToTrust trust{r.reduced_chi2, r.warnings};
   sink(text + trust.header() + "\n");
+  const std::string last_cells = trust.cells();
   const CorrectedLoad &normal = r.normal_force, &circulatory = r.circulatory;
   fmt::memory_buffer row;
   auto out = std::back_inserter(row);
@@ -54,7 +55,7 @@ void to_csv(const TextSink& sink, const CorrectResult& r) {
       further_cells(out, load->by_source.row(k), load->simultaneous * load->std[k], load->half_weight[k], load->twice_weight[k]);
     row.push_back(',');
     if (std::isfinite(r.unexplained[k])) fmt::format_to(out, "{:.4g}", r.unexplained[k]);
-    fmt::format_to(out, "{}\n", trust.cells(static_cast<std::size_t>(k)));
+    fmt::format_to(out, "{}\n", last_cells);
     sink({row.data(), row.size()});
   }
 }
@@ -64,12 +65,13 @@ std::string to_indicial_csv(const CorrectResult& r) {
   std::string text = "semichords,indicial,indicial_std" + further_columns("indicial", "") + ",cn_per_radian [1/rad],cn_per_radian_std [1/rad]";
   const HowFarToTrust trust{r.reduced_chi2, r.warnings};
   text += trust.header() + "\n";
+  const std::string last_cells = trust.cells();
   auto out = std::back_inserter(text);
   for (Index i = 0; i < response.value.size(); ++i) {
     const UncertaintyBySource& u = response.uncertainty;
     fmt::format_to(out, "{:.6g},{:.6g},{:.4g}", response.semichords[i], response.value[i], u.std[i]);
     further_cells(out, u.by_source.row(i), u.simultaneous * u.std[i], response.half_weight[i], response.twice_weight[i]);
-    fmt::format_to(out, ",{:.6g},{:.4g}{}\n", response.per_radian[i], response.per_radian_std[i], trust.cells(static_cast<std::size_t>(i)));
+    fmt::format_to(out, ",{:.6g},{:.4g}{}\n", response.per_radian[i], response.per_radian_std[i], last_cells);
   }
   return text;
 }

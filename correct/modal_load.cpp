@@ -196,6 +196,7 @@ void to_csv(const TextSink& sink, const ModalLoad& r) {
   text += fmt::format(",normal_force_band95 [{0}],normal_force_half_weight [{0}],normal_force_twice_weight [{0}],from_inputs [{0}]", r.unit);
   const HowFarToTrust trust{std::nan(""), r.warnings};
   sink(text + trust.header() + "\n");
+  const std::string last_cells = trust.cells();
   for (Index k = 0; k < r.load.size(); ++k) {
     text.clear();
     auto out = std::back_inserter(text);
@@ -204,7 +205,7 @@ void to_csv(const TextSink& sink, const ModalLoad& r) {
     fmt::format_to(out, ",{:.6g},{:.4g}", r.load[k], r.std[k]);
     for (Index s = 0; s < sources; ++s)
       if (s != static_cast<Index>(Source::angle)) fmt::format_to(out, ",{:.3g}", r.by_source(k, s));
-    fmt::format_to(out, ",{:.4g},{:.6g},{:.6g},{:.6g}{}\n", r.simultaneous * r.std[k], r.half_weight[k], r.twice_weight[k], r.from_inputs[k], trust.cells(static_cast<std::size_t>(k)));
+    fmt::format_to(out, ",{:.4g},{:.6g},{:.6g},{:.6g}{}\n", r.simultaneous * r.std[k], r.half_weight[k], r.twice_weight[k], r.from_inputs[k], last_cells);
     sink(text);
   }
 }

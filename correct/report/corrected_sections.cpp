@@ -78,7 +78,7 @@ void add_corrected(ReportPage& page, const std::string& text, const std::string&
   const Index last = t.size() - 1;
   const double dt = (t[last] - t[0]) / static_cast<double>(last);
 
-  const HowFarToTrust trust = HowFarToTrust::of_table(table, text);
+  const HowFarToTrust trust = HowFarToTrust::of_table(table);
   const bool is_told = std::isfinite(trust.reduced_chi2) || !trust.warnings.empty();
   add_verdict(page, trust, is_told ? Tone::good : Tone::open,
               fmt::format("A rigid rig would have felt a circulatory load of {} {} at the end of the record, after {} {} before the motion.", with_error(circulatory.value[last], circulatory_std.value[last]),
@@ -114,7 +114,7 @@ void add_modal_load(ReportPage& page, const std::string& text, const std::string
   const double dt = (t[t.size() - 1] - t[0]) / static_cast<double>(t.size() - 1);
   const auto rms = [](const VectorXd& x) { return std::sqrt(x.array().isFinite().select(x.array().square(), 0).sum() / static_cast<double>(std::max<Index>(1, x.array().isFinite().count()))); };
 
-  const HowFarToTrust trust = HowFarToTrust::of_table(table, text);
+  const HowFarToTrust trust = HowFarToTrust::of_table(table);
   add_verdict(page, trust, Tone::good,
               fmt::format("A rigid rig that does not move would have read {} {} r.m.s., give or take {}; the gauge reads {}, of which the measured inputs account for {}.", plain(rms(load.value), 4), load.unit,
                           plain(rms(load_std.value), 2), plain(rms(gauge.value), 4), plain(rms(inputs.value), 4)),
@@ -150,7 +150,7 @@ void add_indicial(ReportPage& page, const std::string& text, const std::string& 
   }
   if (known == 0) throw InputError({path, 1}, "no row has a standard deviation", "wanted an indicial response that `unrig correct --indicial` wrote", "");
   const std::string name = file_name(path), range = fmt::format("from {:.3g} to {:.3g} semichords", x[0], x[rows - 1]);
-  const HowFarToTrust trust = HowFarToTrust::of_table(table, text);
+  const HowFarToTrust trust = HowFarToTrust::of_table(table);
   if (within == known)
     add_verdict(page, trust, Tone::good, fmt::format("The indicial response agrees with Wagner's function, which lies within its 95 % band all the way {}.", range), name);
   else

@@ -150,8 +150,8 @@ TEST(Report, TheToneOfACorrectionFollowsItsWarnings) {
   const TemporaryDirectory directory;
   const std::string columns = "time [s],semichords,gauge [N],normal_force [N],normal_force_std [N],circulatory [N],circulatory_std [N],cn,cn_std";
   const std::vector<std::array<std::string, 4>> tables{{",reduced_chi2", ",1.02", ",1.02", "good"},
-                                                       {",reduced_chi2,warning", ",1.02,a.csv: 3 samples are missing", ",1.02,", "open"},
-                                                       {",reduced_chi2,warning", ",1.02,a.csv: Load and response are wrong.", ",1.02,", "bad"},
+                                                       {",reduced_chi2,warning: a.csv: 3 samples are missing", ",1.02,1", ",1.02,1", "open"},
+                                                       {",reduced_chi2,warning: a.csv: Load and response are wrong.", ",1.02,1", ",1.02,1", "bad"},
                                                        {",reduced_chi2", ",1.6", ",1.6", "bad"},
                                                        {"", "", "", "open"}};
   for (const auto& [header, first, second, tone] : tables) {

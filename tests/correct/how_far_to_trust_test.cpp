@@ -38,7 +38,7 @@ TEST(HowFarToTrust, TravelsWithBothTables) {
   for (const std::string& text : {to_csv(r), to_indicial_csv(r)}) {
     const CsvTable table = read_csv(text, 1, "table.csv");
     EXPECT_EQ(table.rows(), rows);
-    const HowFarToTrust trust = HowFarToTrust::of_table(table, text);
+    const HowFarToTrust trust = HowFarToTrust::of_table(table);
     EXPECT_EQ(trust.reduced_chi2, 50.41);
     EXPECT_EQ(trust.warnings, (std::vector<std::string>{"a.csv: one; 'two'", "a.csv: three"}));
   }
@@ -49,7 +49,7 @@ TEST(HowFarToTrust, LeavesATableOfNumbersWhereNothingIsToBeWarnedOf) {
   for (const std::string& text : {to_csv(r), to_indicial_csv(r)}) {
     const CsvTable table = read_csv(text, 1, "table.csv");
     for (const CsvColumn& column : table.columns) EXPECT_EQ(column.text, "") << column.name;
-    EXPECT_TRUE(HowFarToTrust::of_table(table, text).warnings.empty());
+    EXPECT_TRUE(HowFarToTrust::of_table(table).warnings.empty());
   }
   // The first line is the header that formats.md promises.
   EXPECT_TRUE(to_csv(r).starts_with("time [s],semichords,gauge [N],normal_force [N],normal_force_std [N],circulatory [N],circulatory_std [N],cn,cn_std,"));
@@ -65,7 +65,7 @@ TEST(HowFarToTrust, AModalLoadHasItsWarningsAndNoChiSquare) {
   r.warnings = {"a.csv: 3 samples are missing"};
   const std::string text = to_csv(r);
   const CsvTable table = read_csv(text, 1, "table.csv");
-  const HowFarToTrust trust = HowFarToTrust::of_table(table, text);
+  const HowFarToTrust trust = HowFarToTrust::of_table(table);
   EXPECT_TRUE(std::isnan(trust.reduced_chi2));
   EXPECT_EQ(trust.warnings, r.warnings);
 }
