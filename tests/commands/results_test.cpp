@@ -4,6 +4,8 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <numbers>
+#include <random>
 #include <string>
 #include <vector>
 
@@ -147,6 +149,37 @@ TEST(Results, OfModalRigsHaveTheirNames) {
   EXPECT_NEAR(parameter("modal[1].stiffness")["value"].get<double>() / (2 * omega2), 1, 1e-4);
   EXPECT_EQ(parameter("modal[1].stiffness")["unit"], "N/m");
   EXPECT_NEAR(parameter("modal[1].damping")["value"].get<double>() / (2 * 2 * 0.03 * 2 * 3.14159265358979 * 4.8), 1, 1e-3);
+}
+
+/// A sine whose record begins in its middle: there is no rest before it from which the motion could be followed.
+TEST(Results, OfACorrectionThatIsWrongEndWithStatusOne) {
+  const TemporaryDirectory directory;
+  const std::string rig = null_campaign("rig.toml"), fit = directory.path("fit.json");
+  ASSERT_EQ(run_unrig(directory, {"fit", "--rig", rig, null_campaign("dry_pluck.csv"), null_campaign("wet_pluck.csv"), null_campaign("step_a.csv"), "-o", fit}).status, 0);
+  const std::string head = "# unrig_run = 1\n# kind = \"step\"\n# medium = \"water\"\n# density = \"998.2 kg/m^3\"\n# speed = \"0.6096 m/s\"\ntime [s],alpha [deg]";
+  constexpr double dt = 0.002, starts = 1, ends = 8;
+  std::string motion = head + "\n";
+  for (int k = 0; k * dt < ends; ++k) {
+    const double t = k * dt - starts;
+    motion += std::to_string(k * dt) + "," + std::to_string(2 + (t > 0 ? std::sin(2 * std::numbers::pi * 1.5 * t) : 0)) + "\n";
+  }
+  ASSERT_EQ(run_unrig(directory, {"simulate", "--rig", rig, "--fit", fit, "--run", directory.file("motion.csv", motion), "-o", directory.path("whole.csv")}).status, 0);
+
+  const unrig::Run whole = read_run(directory.path("whole.csv"));
+  std::mt19937_64 random(1);
+  std::normal_distribution<double> normal;
+  for (const bool from_rest : {true, false}) {
+    std::string text = head + ",gauge [N]\n";
+    const auto& alpha = whole.channel("alpha").value;
+    const auto& gauge = whole.channel("gauge").value;
+    for (Eigen::Index k = from_rest ? 0 : whole.samples() / 3; k < whole.samples(); ++k)
+      text += std::to_string(static_cast<double>(k) * dt) + "," + std::to_string(alpha[k] * 180 / std::numbers::pi + 0.01 * normal(random)) + "," + std::to_string(gauge[k] + 0.027 * normal(random)) + "\n";
+    const std::string out = directory.path("corrected.csv");
+    const Finished finished = run_unrig(directory, {"correct", "--rig", rig, "--fit", fit, directory.file("sine.csv", text), "-o", out});
+    EXPECT_EQ(finished.status, from_rest ? 0 : 1) << finished.err;
+    EXPECT_EQ(finished.err.find("Load and response are wrong") == std::string::npos, from_rest) << finished.err;
+    EXPECT_THAT(first_line_of_numbers(test::whole_file(out)), StartsWith("time [s],semichords,")) << "the table is there all the same";
+  }
 }
 
 }  // namespace
