@@ -49,6 +49,7 @@ struct CorrectResult {
   Imposed imposed;                  ///< on the response; what its limit at the step is and whether it falls are then of the estimate without that
   double calibration_uncertainty = 0;
   std::vector<std::string> warnings;
+  std::string no_answer;  ///< why load and response are not to be trusted, and what to do; empty: they are
 };
 
 /// The load of a rigid rig out of a gauge record, and the indicial response, without assuming Wagner's shape.

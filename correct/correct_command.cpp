@@ -3,14 +3,11 @@
 #include <CLI/CLI.hpp>
 #include <fmt/format.h>
 
-#include <cmath>
-
 #include "core/command.h"
 #include "core/given_files.h"
 #include "core/text_file.h"
 #include "correct/correct.h"
 #include "correct/corrected_files.h"
-#include "correct/how_far_to_trust.h"
 #include "correct/modal_load.h"
 
 namespace unrig {
@@ -18,13 +15,12 @@ namespace unrig {
 namespace {
 
 template <class Result>
-int finish(const Result& result, const std::string& output, Progress& progress) {
+void finish(const Result& result, const std::string& output, Progress& progress) {
   for (const std::string& warning : result.warnings) warn(warning);
   progress("writing " + output);
   write_text(output, [&](const TextSink& sink) { to_csv(sink, result); });
   progress.clear();
   fmt::print("{}", report(result));
-  return HowFarToTrust{std::nan(""), result.warnings}.is_wrong() ? exit_no_answer : exit_done;
 }
 
 }  // namespace
@@ -57,11 +53,15 @@ int correct_command(int argc, char** argv) {
   if (problem.rig.is_modal()) {
     if (imposed.any() || !indicial.empty())
       throw InputError({rig_path, 0}, "a rig known only as modes", "wanted a rig with a section for an indicial response", "Leave out --indicial, --monotone and --at-step.");
-    return finish(modal_load(problem), output, progress);
+    finish(modal_load(problem), output, progress);
+    return exit_done;
   }
   const CorrectResult result = correct(problem);
   if (!indicial.empty()) write_text(indicial, to_indicial_csv(result));
-  return finish(result, output, progress);
+  finish(result, output, progress);
+  if (result.no_answer.empty()) return exit_done;
+  warn("no trustworthy answer: " + result.no_answer);
+  return exit_no_answer;
 }
 
 }  // namespace unrig

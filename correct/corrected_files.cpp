@@ -38,7 +38,7 @@ std::string to_csv(const CorrectResult& r) {
 void to_csv(const TextSink& sink, const CorrectResult& r) {
   std::string text = "time [s],semichords,gauge [N],normal_force [N],normal_force_std [N],circulatory [N],circulatory_std [N],cn,cn_std";
   text += further_columns("circulatory", " [N]") + further_columns("normal_force", " [N]") + ",unexplained [N]";
-  const HowFarToTrust trust{r.reduced_chi2, r.warnings};
+  const HowFarToTrust trust{r.reduced_chi2, r.warnings, r.no_answer};
   sink(text + trust.header() + "\n");
   const std::string last_cells = trust.cells();
   const CorrectedLoad &normal = r.normal_force, &circulatory = r.circulatory;
@@ -63,7 +63,7 @@ void to_csv(const TextSink& sink, const CorrectResult& r) {
 std::string to_indicial_csv(const CorrectResult& r) {
   const IndicialResponse& response = r.indicial;
   std::string text = "semichords,indicial,indicial_std" + further_columns("indicial", "") + ",cn_per_radian [1/rad],cn_per_radian_std [1/rad]";
-  const HowFarToTrust trust{r.reduced_chi2, r.warnings};
+  const HowFarToTrust trust{r.reduced_chi2, r.warnings, r.no_answer};
   text += trust.header() + "\n";
   const std::string last_cells = trust.cells();
   auto out = std::back_inserter(text);

@@ -7,11 +7,12 @@
 
 namespace unrig {
 
-/// What a reader of the results must know, in the last columns of their tables: the reduced chi-square in every row, and a column of ones for each warning, which is its name. Every cell stays a
-/// number, and the header the first line, as formats.md shows it: lines of comment or columns of text would stop the programs that read these tables.
+/// What a reader of the results must know, in the last columns of their tables: the reduced chi-square in every row, and a column of ones for each warning, which is its name, and for what makes the
+/// numbers no answer. Every cell stays a number, and the header the first line, as formats.md shows it: lines of comment or columns of text would stop the programs that read these tables.
 struct HowFarToTrust {
   double reduced_chi2 = 0;  ///< NaN where the result has none
   std::vector<std::string> warnings;
+  std::string no_answer;
 
   std::string header() const;
   /// The cells of any row.
@@ -21,9 +22,6 @@ struct HowFarToTrust {
 
   /// Gauge and angle are explained no better than this where something is missing from the model.
   static constexpr double explained = 1.5;
-  /// Stands in a warning after which the answer is not one.
-  static constexpr const char* wrong = "Load and response are wrong";
-  bool is_wrong() const;
 };
 
 }  // namespace unrig

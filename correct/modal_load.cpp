@@ -194,7 +194,7 @@ void to_csv(const TextSink& sink, const ModalLoad& r) {
   for (Index s = 0; s < sources; ++s)
     if (s != static_cast<Index>(Source::angle)) text += fmt::format(",normal_force_std_{} [{}]", source_names[static_cast<std::size_t>(s)], r.unit);
   text += fmt::format(",normal_force_band95 [{0}],normal_force_half_weight [{0}],normal_force_twice_weight [{0}],from_inputs [{0}]", r.unit);
-  const HowFarToTrust trust{std::nan(""), r.warnings};
+  const HowFarToTrust trust{std::nan(""), r.warnings, {}};
   sink(text + trust.header() + "\n");
   const std::string last_cells = trust.cells();
   for (Index k = 0; k < r.load.size(); ++k) {

@@ -11,7 +11,6 @@
 
 #include <fmt/format.h>
 
-#include "correct/how_far_to_trust.h"
 #include "correct/restless_run.h"
 #include "correct/uncertainty_budget.h"
 
@@ -302,9 +301,9 @@ void warn(const RestlessRun& run, const RestlessRun::Point& point, double reduce
     }
     if (worst <= most) continue;
     if (worst_at == start) {
-      result.warnings.push_back(fmt::format("{}: at the first sample the shaft or the rig moves already, where both must be at rest: what a sample adds there is {:.2f} times what is expected. {}. "
-                                            "Begin the record before the motion.",
-                                            result.file, std::sqrt(worst), HowFarToTrust::wrong));
+      result.no_answer = fmt::format("{}: at the first sample the shaft or the rig moves already, where both must be at rest: what a sample adds there is {:.2f} times what is expected. Load and response "
+                                     "are wrong. Begin the record before the motion.",
+                                     result.file, std::sqrt(worst));
       return;
     }
     result.warnings.push_back(fmt::format("{}: in {:.2g} % of the record, most of all from {:.4g} s on, the readings follow the model less well than elsewhere: over {:.3g} s there what a sample adds is {:.2f} times "

@@ -1,7 +1,6 @@
 #include "fit/simulated_run.h"
 
 #include <algorithm>
-#include <array>
 
 namespace unrig {
 namespace {
@@ -31,11 +30,6 @@ std::optional<SimulatedRun> simulated_run(std::string_view text) {
   }
   if (run.recipe.empty() || !run.recipe.front().starts_with(simulated)) return std::nullopt;
   return run;
-}
-
-bool is_input(std::string_view channel) {
-  constexpr std::array<std::string_view, 5> inputs{"alpha", "force", "mount_velocity", "mount_acceleration", "weight"};
-  return std::find(inputs.begin(), inputs.end(), channel) != inputs.end();
 }
 
 }  // namespace unrig

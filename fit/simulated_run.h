@@ -17,7 +17,4 @@ struct SimulatedRun {
 /// Out of the text of a run file; nothing where `unrig simulate` did not write it.
 std::optional<SimulatedRun> simulated_run(std::string_view text);
 
-/// A column that a run gives to the model.
-bool is_input(std::string_view channel);
-
 }  // namespace unrig

@@ -93,12 +93,13 @@ def diagnosis(work, picture):
     said = json.loads((work / "diagnosis.json").read_text())
     effect = said["missing"][0]["effect"]
     improved = next(r for r in said["improvement"]["runs"] if r["file"].endswith(f"{run}.csv"))
+    rms = lambda x: np.sqrt(np.nanmean(x**2))
     time, before = residual(fit(campaign, work / "without.json"), run)
     _, after = residual(fit(campaign, work / "with.json", "--effect", effect), run)
 
     figure, axes = plt.subplot_mosaic([["before", "before"], ["map", "ranking"]], figsize=(8.4, 6.2), height_ratios=[1, 1.1], width_ratios=[1.5, 1], layout="constrained")
-    axes["before"].plot(time, before, color=ORANGE, lw=0.8, label=f"model without it: r.m.s. {improved['rms_before']:.2f} N")
-    axes["before"].plot(time, after, color=BLUE, lw=0.8, label=f"with {effect}: r.m.s. {improved['rms_after']:.3f} N (noise {improved['noise']:.3f} N)")
+    axes["before"].plot(time, before, color=ORANGE, lw=0.8, label=f"model without it, fitted: r.m.s. {rms(before):.2f} N")
+    axes["before"].plot(time, after, color=BLUE, lw=0.8, label=f"with {effect}: r.m.s. {rms(after):.3f} N (noise {improved['noise']:.3f} N)")
     axes["before"].set(xlabel="time [s]", ylabel="gauge − model [N]", xlim=(0.5, 4), title=f"unrig diagnose: \"{said['verdict']}\" (campaigns/{campaign}, {run})")
     axes["before"].set_ylim(top=1.45 * np.nanmax(before))
     axes["before"].legend(loc="upper right", ncols=2, framealpha=1)

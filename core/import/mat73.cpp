@@ -163,7 +163,7 @@ enum ChildStatus { child_done = 0, child_no_file = 3 };
 
 /// Ends this process with its parent, and where it takes more memory or time than a file of this size can need: a damaged one can ask for any.
 void limit(std::uintmax_t file_size) {
-  constexpr std::uintmax_t base = 1u << 30, packed_at_most = 50;  // bytes of memory; deflate packs recorded numbers to a twentieth at best
+  constexpr std::uintmax_t base = 1u << 30, times_the_file = 50;  // bytes of memory: for 130 million samples packed to nothing, beside what is packed
   constexpr std::uintmax_t seconds = 5, bytes_a_second = 2u << 20;  // of processor time
   ::prctl(PR_SET_PDEATHSIG, SIGKILL);
   std::uintmax_t pages = 0;  // a sanitizer's shadow is address space too
@@ -172,7 +172,7 @@ void limit(std::uintmax_t file_size) {
     const rlimit both{value, value};
     ::setrlimit(static_cast<__rlimit_resource>(what), &both);
   };
-  most(RLIMIT_AS, pages * static_cast<std::uintmax_t>(::sysconf(_SC_PAGESIZE)) + base + packed_at_most * file_size);
+  most(RLIMIT_AS, pages * static_cast<std::uintmax_t>(::sysconf(_SC_PAGESIZE)) + base + times_the_file * file_size);
   most(RLIMIT_CPU, seconds + file_size / bytes_a_second);
   most(RLIMIT_CORE, 0);
 }
@@ -206,7 +206,7 @@ Recording read_mat73(const std::string& path) {
   while (::waitpid(child, &status, 0) < 0 && errno == EINTR) {
   }
   if (WIFEXITED(status) && WEXITSTATUS(status) == child_no_file) throw refuse("this is no MATLAB file of version 7.3");
-  if (!WIFEXITED(status) || WEXITSTATUS(status) != child_done) throw refuse("the file is damaged: libmatio, which reads it, broke down");
+  if (!WIFEXITED(status) || WEXITSTATUS(status) != child_done) throw refuse("the file is damaged: libmatio, which reads it, broke down, or asked for more memory or time than a file of this size can need");
   Recording out = unpacked(read_text(handed), path);
   if (out.channels.empty()) throw refuse("the file holds no variable with real numbers");
   return out;

@@ -55,14 +55,15 @@ std::string caption_of_band(double factor) {
 
 /// The verdict in the tone of what a reader must know first.
 void add_verdict(ReportPage& page, const HowFarToTrust& trust, Tone tone, const std::string& text, const std::string& about) {
+  if (!trust.no_answer.empty()) return page.add_verdict(Tone::bad, "Not to be trusted, see below. " + text, about);
   if (trust.reduced_chi2 > HowFarToTrust::explained)
-    return page.add_verdict(Tone::bad, fmt::format("Not to be trusted: gauge and angle are explained to a reduced chi-square of {} only. {}", plain(trust.reduced_chi2, 3), text), about);
-  if (trust.is_wrong()) return page.add_verdict(Tone::bad, fmt::format("Not to be trusted: {}. {}", HowFarToTrust::wrong, text), about);
+    return page.add_verdict(Tone::bad, fmt::format("Something is missing from the rig of the fit: gauge and angle are explained to a reduced chi-square of {} only. {}", plain(trust.reduced_chi2, 3), text), about);
   if (!trust.warnings.empty()) return page.add_verdict(Tone::open, text + " See the warnings below.", about);
   page.add_verdict(tone, text, about);
 }
 
 void add_warnings(ReportPage& page, const HowFarToTrust& trust) {
+  if (!trust.no_answer.empty()) page.add_text("No trustworthy answer: " + trust.no_answer);
   for (const std::string& warning : trust.warnings) page.add_text("Warning: " + warning);
 }
 
@@ -79,7 +80,7 @@ void add_corrected(ReportPage& page, const std::string& text, const std::string&
   const double dt = (t[last] - t[0]) / static_cast<double>(last);
 
   const HowFarToTrust trust = HowFarToTrust::of_table(table);
-  const bool is_told = std::isfinite(trust.reduced_chi2) || !trust.warnings.empty();
+  const bool is_told = std::isfinite(trust.reduced_chi2) || !trust.warnings.empty() || !trust.no_answer.empty();
   add_verdict(page, trust, is_told ? Tone::good : Tone::open,
               fmt::format("A rigid rig would have felt a circulatory load of {} {} at the end of the record, after {} {} before the motion.", with_error(circulatory.value[last], circulatory_std.value[last]),
                           load.unit, plain(circulatory.value[0], 4), load.unit),

@@ -87,7 +87,8 @@ void add_ranking(ReportPage& page, const json& ranking) {
   std::vector<std::vector<std::string>> rows;
   for (const json& r : ranking)
     rows.push_back({text_of(r, "effect"), plain(number_of(r, "score"), 4), plain(number_of(r, "reduced_chi2"), 4), plain(number_of(r, "delta_bic"), 5), plain(number_of(r, "probability"), 3)});
-  if (!rows.empty()) page.add_table("Ranking of the effects", {"effect", "score", "reduced chi-square", "change of BIC", "probability"}, rows, "Score: the share of the excess of chi-square that one linear step in the effect's parameters promised to remove, which decided what was fitted in full; 0 for what joined the search later. "
+  if (!rows.empty()) page.add_table("Ranking of the effects", {"effect", "score", "reduced chi-square", "change of BIC", "probability"}, rows,
+                   "Score: the share of the excess of chi-square that one linear step in the effect's parameters promised to remove, which decided what was fitted in full; 0 for what joined the search later. "
                    "The more negative the change of BIC, the more the effect explains for its parameters.");
 }
 
@@ -131,7 +132,8 @@ void add_improvement(ReportPage& page, const json& improvement) {
   }
   if (rows.empty()) return;
   page.add_table("Residuals before and after", {"run", "", "before (r.m.s.)", "after (r.m.s.)", "noise (std)", "unit", "before / noise", "after / noise"}, rows,
-                 fmt::format("Before: {}. `unrig fit` gives all runs their full weight and may leave less of these, and more of the others. BIC {} before, {} after.", rig_alone, plain(number_of(improvement, "bic_before"), 7), plain(number_of(improvement, "bic_after"), 7)));
+                 fmt::format("Before: {}. `unrig fit` gives all runs their full weight and may leave less of these, and more of the others. BIC {} before, {} after.", rig_alone,
+                             plain(number_of(improvement, "bic_before"), 7), plain(number_of(improvement, "bic_after"), 7)));
 }
 
 void add_time_frequency(ReportPage& page, const json& map) {

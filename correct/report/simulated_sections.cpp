@@ -87,11 +87,12 @@ void add_channel(ReportPage& page, const Run& run, const Channel& channel, const
               "Amplitude of the whole record, mean removed, Hann window. What stands out of the difference is not in the simulation.");
 }
 
-/// What the channel that matters most says: the gauge, or else the first that was not given.
+/// The gauge, or else the first that the rig's sensors name.
 const Channel* answer_of(const Run& run) {
   if (const Channel* gauge = run.find("gauge")) return gauge;
+  const std::vector<std::string_view> given = columns_with_a_meaning();
   for (const Channel& channel : run.channels)
-    if (!is_input(channel.name)) return &channel;
+    if (std::find(given.begin(), given.end(), channel.name) == given.end()) return &channel;
   return nullptr;
 }
 

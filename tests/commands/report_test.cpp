@@ -136,7 +136,7 @@ TEST(Report, ACorrectionThatIsWrongGetsNoTick) {
   const json data = page_data(output);
   for (const json& verdict : data["verdicts"]) {
     EXPECT_EQ(verdict["tone"], "bad") << verdict;
-    EXPECT_THAT(verdict["text"].get<std::string>(), ::testing::StartsWith("Not to be trusted: gauge and angle are explained to a reduced chi-square of ")) << verdict;
+    EXPECT_THAT(verdict["text"].get<std::string>(), ::testing::StartsWith("Something is missing from the rig of the fit: gauge and angle are explained to a reduced chi-square of ")) << verdict;
   }
   std::size_t warnings = 0;
   for (const json& text : blocks(data, "text")) warnings += text["text"].get<std::string>().find("Something is missing from the rig of the fit") != std::string::npos ? 1 : 0;
@@ -151,7 +151,7 @@ TEST(Report, TheToneOfACorrectionFollowsItsWarnings) {
   const std::string columns = "time [s],semichords,gauge [N],normal_force [N],normal_force_std [N],circulatory [N],circulatory_std [N],cn,cn_std";
   const std::vector<std::array<std::string, 4>> tables{{",reduced_chi2", ",1.02", ",1.02", "good"},
                                                        {",reduced_chi2,warning: a.csv: 3 samples are missing", ",1.02,1", ",1.02,1", "open"},
-                                                       {",reduced_chi2,warning: a.csv: Load and response are wrong.", ",1.02,1", ",1.02,1", "bad"},
+                                                       {",reduced_chi2,no answer: a.csv: it moves.", ",1.02,1", ",1.02,1", "bad"},
                                                        {",reduced_chi2", ",1.6", ",1.6", "bad"},
                                                        {"", "", "", "open"}};
   for (const auto& [header, first, second, tone] : tables) {

@@ -34,13 +34,15 @@ CorrectResult made_up_result(double reduced_chi2, std::vector<std::string> warni
 }
 
 TEST(HowFarToTrust, TravelsWithBothTables) {
-  const CorrectResult r = made_up_result(50.41, {"a.csv: one, \"two\"", "a.csv: three"});
+  CorrectResult r = made_up_result(50.41, {"a.csv: one, \"two\"", "a.csv: three [N]"});
+  r.no_answer = "a.csv: it moves";
   for (const std::string& text : {to_csv(r), to_indicial_csv(r)}) {
     const CsvTable table = read_csv(text, 1, "table.csv");
     EXPECT_EQ(table.rows(), rows);
     const HowFarToTrust trust = HowFarToTrust::of_table(table);
     EXPECT_EQ(trust.reduced_chi2, 50.41);
-    EXPECT_EQ(trust.warnings, (std::vector<std::string>{"a.csv: one; 'two'", "a.csv: three"}));
+    EXPECT_EQ(trust.warnings, (std::vector<std::string>{"a.csv: one; 'two'", "a.csv: three (N)"}));
+    EXPECT_EQ(trust.no_answer, "a.csv: it moves");
   }
 }
 
@@ -50,6 +52,7 @@ TEST(HowFarToTrust, LeavesATableOfNumbersWhereNothingIsToBeWarnedOf) {
     const CsvTable table = read_csv(text, 1, "table.csv");
     for (const CsvColumn& column : table.columns) EXPECT_EQ(column.text, "") << column.name;
     EXPECT_TRUE(HowFarToTrust::of_table(table).warnings.empty());
+    EXPECT_EQ(HowFarToTrust::of_table(table).no_answer, "");
   }
   // The first line is the header that formats.md promises.
   EXPECT_TRUE(to_csv(r).starts_with("time [s],semichords,gauge [N],normal_force [N],normal_force_std [N],circulatory [N],circulatory_std [N],cn,cn_std,"));
@@ -68,13 +71,6 @@ TEST(HowFarToTrust, AModalLoadHasItsWarningsAndNoChiSquare) {
   const HowFarToTrust trust = HowFarToTrust::of_table(table);
   EXPECT_TRUE(std::isnan(trust.reduced_chi2));
   EXPECT_EQ(trust.warnings, r.warnings);
-}
-
-TEST(HowFarToTrust, KnowsWhatIsWrong) {
-  EXPECT_FALSE((HowFarToTrust{1.02, {}}.is_wrong()));
-  EXPECT_FALSE((HowFarToTrust{1.02, {"a.csv: 3 samples are missing"}}.is_wrong()));
-  EXPECT_TRUE((HowFarToTrust{50.4, {}}.is_wrong()));
-  EXPECT_TRUE((HowFarToTrust{1.02, {std::string("a.csv: ") + HowFarToTrust::wrong + ". Begin the record before the motion."}}.is_wrong()));
 }
 
 }  // namespace

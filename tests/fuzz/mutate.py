@@ -2,7 +2,7 @@
 
   python3 tests/fuzz/mutate.py build/unrig FILE [SECONDS]
 
-Exit 0 or 2 with a message is an answer; a signal, another status, a message of no line or ten seconds are findings. They stay in build/fuzz as mutated-*.
+Exit 0 or 2 with a message is an answer; a signal, another status, no message or ten seconds are findings. They stay in build/fuzz as mutated-*.
 """
 
 import pathlib
