@@ -3,7 +3,8 @@
 
   python3 sample_data/verdicts.py build/unrig sample_data/concealed > VERDICTS.md
 
-Each campaign is a folder with rig.toml, runs (*.csv) and heldout.csv; truth_*.csv are not read. What `diagnose` says is written down as it comes out.
+Each campaign is a folder with rig.toml, runs (*.csv) and heldout.csv; truth_*.csv are not read. What `diagnose` says is written down as it comes out;
+what was true stands beside it where the folder has a KEY.json, which is opened for that column only.
 """
 import datetime
 import json
@@ -27,9 +28,18 @@ def diagnose(unrig, folder):
         return json.loads(output.read_text()) if output.exists() else None
 
 
-def row(name, d):
+def truth(key, name):
+    """The last column: effects and parameters of KEY.json; empty where there is none."""
+    if key is None:
+        return ""
+    said = key[name]
+    numbers = "; ".join(f"{k} {v:.4g}" for k, v in said["parameters"].items() if isinstance(v, (int, float)))
+    return f" {', '.join(said['effects']) or 'nothing'}{': ' if numbers else ''}{numbers} |"
+
+
+def row(name, d, key):
     if d is None:
-        return f"| {name} | no verdict within {LIMIT} s | | | | | |"
+        return f"| {name} | no verdict within {LIMIT} s | | | | | |{truth(key, name)}"
     found = ", ".join(f"{m['effect']} ({m['probability']:.3f})" for m in d["missing"]) or ("unexplained" if d["unexplained"] else "nothing missing")
     if d["missing"] and d["unexplained"]:
         found += "; something remains"
@@ -42,20 +52,23 @@ def row(name, d):
     held = [r for r in d["improvement"]["runs"] if r["heldout"]]
     rms = lambda rows, key: (sum(r[key] ** 2 for r in rows) / len(rows)) ** 0.5
     return (f"| {name} | {found} | {parameters} | {rms(fitted, 'rms_before'):.4f} → {rms(fitted, 'rms_after'):.4f} | {rms(fitted, 'noise'):.4f} | "
-            f"{rms(held, 'rms_before'):.4f} → {rms(held, 'rms_after'):.4f} | {d['improvement']['bic_after'] - d['improvement']['bic_before']:.0f} |")
+            f"{rms(held, 'rms_before'):.4f} → {rms(held, 'rms_after'):.4f} | {d['improvement']['bic_after'] - d['improvement']['bic_before']:.0f} |{truth(key, name)}")
 
 
-def table(named):
-    print("| campaign | verdict (probability among the sets tried) | parameters | fitted, r.m.s. before → after [N] | noise [N] | held out, before → after [N] | ΔBIC |")
-    print("| --- | --- | --- | --- | --- | --- | --- |")
+def table(named, key=None):
+    known = key is not None
+    print("| campaign | verdict (probability among the sets tried) | parameters | fitted, r.m.s. before → after [N] | noise [N] | held out, before → after [N] | ΔBIC |" + " true |" * known)
+    print("| --- | --- | --- | --- | --- | --- | --- |" + " --- |" * known)
     for name, d in named:
-        print(row(name, d), flush=True)
+        print(row(name, d, key), flush=True)
 
 
 def main():
     unrig, campaigns = sys.argv[1], pathlib.Path(sys.argv[2])
     print(f"{datetime.date.today()}, `python3 sample_data/verdicts.py {unrig} {campaigns}`\n")
-    table((folder.name, diagnose(unrig, folder)) for folder in sorted(campaigns.iterdir()) if (folder / "rig.toml").exists())
+    answers = campaigns / "KEY.json"
+    key = json.loads(answers.read_text()) if answers.exists() else None
+    table(((folder.name, diagnose(unrig, folder)) for folder in sorted(campaigns.iterdir()) if (folder / "rig.toml").exists()), key)
 
 
 if __name__ == "__main__":
