@@ -83,7 +83,7 @@ def correction(work, picture):
     for axes in (above, below):
         axes.grid(color="0.9", lw=0.6)
         axes.set_axisbelow(True)
-    figure.savefig(picture, dpi=130)
+    figure.savefig(picture, dpi=100)
 
 
 def diagnosis(work, picture):
@@ -119,7 +119,7 @@ def diagnosis(work, picture):
     axes["ranking"].bar_label(bars, [f"{x:.2f}" if x < 10 else f"{x:.0f}" for x in chi2], padding=3, fontsize="small")
     axes["ranking"].axvline(1, color=BLACK, lw=1, ls=(0, (4, 3)))
     axes["ranking"].set(xscale="log", xlim=(0.5, 12 * max(chi2)), xlabel="reduced chi-square\n(1: only noise is left)", title="the effects fitted")
-    figure.savefig(picture, dpi=130)
+    figure.savefig(picture, dpi=100)
 
 
 if __name__ == "__main__":
