@@ -78,12 +78,12 @@ struct LinearSystem {
 ///   circulatory force  s rho U b l Int phi(U(t-t')/b) dw(t'),  w = U theta - h' + (1/2 - a) b theta', at quarter chord    (Eq. 2.6-2.9)
 ///
 /// with s the normal-force slope per radian in place of 2 pi. C_a multiplies the reaction to acceleration only: the centrifugal term is
-/// momentum carried by the stream, and the recordings in `campaigns/open` hold it at pi rho b^2 whatever C_a is.
+/// momentum carried by the stream, and the recordings in `sample_data/campaigns` hold it at pi rho b^2 whatever C_a is.
 /// All are deviations from the state before the motion; the steady load is a constant of the run.
 /// The inertia of mass centres off the pitch axis couples the chains (Eq. 3.12, 3.15). Apparent mass and inertia stand in the mass matrix.
 ///
 /// Gauge: bending moment at its station over the lever to the calibration station, as the sum over all forces outboard, inertial ones included,
-/// so that the static part of modes left out is kept (errata, point 7).
+/// so that the static part of modes left out is kept (tests/verification/one_mode_test.cpp).
 ///
 /// A rig that is known only as modes: m q'' + c q' + k q = force - g acceleration of the mount, gauge = sum of gain times q.
 class AeroelasticModel {

@@ -11,7 +11,7 @@ struct Command {
   int (*run)(int argc, char** argv);  ///< argv[0] is the command's name; returns the exit status
 };
 
-/// Exit statuses (formats.md, section 4).
+/// Exit statuses (correct/manual/results.md).
 enum ExitStatus : int { exit_done = 0, exit_no_answer = 1, exit_wrong_use = 2 };
 
 /// Writes progress to standard error, on a terminal only: one line that is overwritten, removed by `clear`.

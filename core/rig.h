@@ -17,7 +17,7 @@ struct Chain {
   int modes = 0;                    ///< modes to keep; 0 = all below the run's Nyquist frequency
 };
 
-/// What a further channel measures (formats.md, section 3).
+/// What a further channel measures (correct/manual/rig_files.md).
 enum class SensorKind { displacement, velocity, acceleration, twist, twist_rate };
 struct Sensor {
   std::string column;
@@ -36,7 +36,7 @@ struct ModalMode {
   std::string gauge_unit;  ///< SI unit of the reading ("N", "rad", "N.m")
 };
 
-/// A structure, in SI (formats.md, section 3). Either `modal` is filled, or the two chains and what belongs to them.
+/// A structure, in SI (correct/manual/rig_files.md). Either `modal` is filled, or the two chains and what belongs to them.
 struct Rig {
   std::string file;
   std::string name;
@@ -66,13 +66,13 @@ struct Rig {
   double axis() const { return 2 * pitch_axis - 1; }
 };
 
-/// Reads a rig file (formats.md, section 3). Throws InputError (file, line, key, found, wanted) for unknown keys, wrong units, mismatched
+/// Reads a rig file (correct/manual/rig_files.md). Throws InputError (file, line, key, found, wanted) for unknown keys, wrong units, mismatched
 /// lengths, elements out of range, and a flexibility matrix that is not symmetric or not positive definite within the rounding of its
 /// printed digits.
 ///
-/// Beyond formats.md it understands:
+/// Among its keys:
 ///
-/// A flexibility that was *measured*, so that its uncertainty goes into the fit:
+/// A flexibility that was *measured*: what its scatter explains is accepted as symmetric and positive definite:
 ///
 ///     flexibility.std_percent = 2.0        # one standard deviation, in percent of every entry; or
 ///     flexibility.std_rows = [[..], ..]    # of each entry, in the unit and scale of flexibility.rows

@@ -9,7 +9,7 @@
 
 namespace unrig {
 
-/// How a recording was made (formats.md, section 2): prescribed pitch, free decay, measured force, moved mount.
+/// How a recording was made (correct/manual/run_files.md): prescribed pitch, free decay, measured force, moved mount.
 enum class RunKind { step, pluck, forced, moved };
 std::string to_string(RunKind kind);
 
@@ -52,7 +52,7 @@ struct Run {
   const Channel& channel(std::string_view column) const;
 };
 
-/// Reads a run file (formats.md, section 2).
+/// Reads a run file (correct/manual/run_files.md).
 ///
 /// Times that are printed roughly stay on their uniform grid; where times jitter every channel is interpolated linearly to it, and
 /// `resampled` says so; a gap of more than 1.5 steps, or 5 where times jitter throughout, is an error with its place (core/time_grid.h has

@@ -8,7 +8,7 @@
 
 namespace unrig {
 
-/// `run` as the text of a run file (formats.md, section 2), which read_run reads back: name, kind, medium, density and speed, then time and
+/// `run` as the text of a run file (correct/manual/run_files.md), which read_run reads back: name, kind, medium, density and speed, then time and
 /// every channel. `remarks` become lines of the head that readers skip.
 ///
 /// A channel stands in the unit of the file it came from; one that was calibrated (volts to newtons) or shifted (degC) stands in SI, and so

@@ -38,7 +38,7 @@ Basis make_basis(const Rig& rig, Eigen::Index normal_modes, Eigen::Index torsion
 
 /// The basis the rig file asks for. "all" means: every mode in vacuum below `nyquist` [Hz], and then as many more as it takes until a further
 /// one moves no frequency below `nyquist`, with the apparent mass of a fluid of `density` [kg/m^3], by more than 1e-3 of itself: in a thin
-/// basis of vacuum modes the frequencies in water converge slowly (errata, point 7).
+/// basis of vacuum modes the frequencies in water converge slowly (tests/verification/printed_numbers_test.cpp).
 Basis make_basis(const Rig& rig, double nyquist, double density);
 
 /// Frequencies [Hz] of the coupled rig at rest in a fluid (no damping, speed 0), ascending.

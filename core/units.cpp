@@ -32,7 +32,7 @@ std::mutex& udunits_lock() {
 
 Unit parse(ut_system* system, const std::string& text) { return Unit(ut_parse(system, text.c_str(), UT_UTF8)); }
 
-/// The unit database with the aliases of formats.md, section 1; `lb` is the pound mass in it already.
+/// The unit database with the aliases of correct/manual/run_files.md; `lb` is the pound mass in it already.
 ut_system* open_database() {
   ut_set_error_message_handler(ut_ignore);  // failures are reported by exception, not on standard error
   ut_system* system = ut_read_xml(nullptr);

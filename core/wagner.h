@@ -37,7 +37,7 @@ enum class Wagner {
   within_1e4,  ///< 6 poles, 9.66e-5 (equal ripple, the first at s = 0) [2.86e-4]
   within_1e6,  ///< 13 poles, 7.29e-7 (equal ripple, the first at s = 0) [2.68e-6]
   jones,       ///< 2 poles, 9.59e-3 (s = 82; at s = 100, 1 - phi is 84 % too small) [1.46e-2]: R. T. Jones, NACA Report 681 (1940)
-  seed,        ///< 2 poles, 2.26e-2 (s = 0.5) [3.18e-2]: the coefficients behind the seed's Eq. 3.23 (errata, 1)
+  seed,        ///< 2 poles, 2.26e-2 (s = 0.5) [3.18e-2]: the coefficients behind the seed's Eq. 3.23, which is misprinted
 };
 
 /// The approximation, rates ascending. `within_1e4` and `within_1e6` are the best sums of that many exponentials in the sense of the

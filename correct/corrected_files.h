@@ -6,7 +6,7 @@
 
 namespace unrig {
 
-/// `corrected.csv`: columns as in formats.md, section 4, further ones behind them, the last what a reader must know (correct/how_far_to_trust.h).
+/// `corrected.csv`: columns as in correct/manual/results.md, the last what a reader must know (correct/how_far_to_trust.h).
 std::string to_csv(const CorrectResult& result);
 /// The same row by row, for files that are long.
 void to_csv(const TextSink& sink, const CorrectResult& result);

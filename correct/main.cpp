@@ -54,6 +54,7 @@ A rig file holds its section, masses, flexibilities and gauge, or only its modes
     damping_ratio = 0.01
     gauge_gain = "1000 N/m"        # reading per unit of modal displacement
 sample_data/campaigns/null has complete ones of a tow-tank rig (once installed: share/doc/unrig/null). Every value has its unit, any that UDUNITS-2 knows.
+The manual, with every key, column and verdict: correct/manual (once installed: share/doc/unrig/manual).
 )", stream);
 }
 

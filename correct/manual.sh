@@ -12,3 +12,4 @@ for command in $(echo "$help" | sed -n 's/^  \([a-z][a-z-]*\) .*/\1/p'); do
   printf '.SH unrig %s\n' "$(echo "$command" | sed 's/-/\\-/g')"
   "$unrig" "$command" --help | verbatim
 done
+printf '.SH SEE ALSO\nshare/doc/unrig/manual: run files, rig files, results and verdicts, effects, method, library.\n'

@@ -5,7 +5,7 @@
 
 namespace unrig {
 
-/// `apparent.json` (formats.md, section 4). Beyond it: `modes` of each run, `parameters` as in fit.json, `frequency_ratio`, `joint_fit`, `agreement`.
+/// `apparent.json` (correct/manual/results.md), with `modes` of each run, `parameters` as in fit.json, `frequency_ratio`, `joint_fit`, `agreement`.
 /// What a rig that is known only as modes does not have is null.
 std::string to_json(const ApparentMassResult& result);
 

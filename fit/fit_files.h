@@ -6,7 +6,7 @@
 
 namespace unrig {
 
-/// `fit.json` (formats.md, section 4), with the circulation, the modes kept and the full correlation matrix.
+/// `fit.json` (correct/manual/results.md), with the circulation, the modes kept and the full correlation matrix.
 std::string to_json(const FitResult& result);
 
 /// Parameters of a `fit.json`, as far as `simulate` and `correct` need them.

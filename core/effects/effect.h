@@ -33,7 +33,7 @@ struct EffectContext {
 enum class Needs { any_rig, beam, twist_reading };
 bool has(const Rig& rig, Needs needs);
 
-/// One candidate for missing physics (formats.md, section 5): what it is, where it can act, and how it changes the linear system of a run.
+/// One candidate for missing physics (correct/manual/effects.md): what it is, where it can act, and how it changes the linear system of a run.
 ///
 /// To add one: a file in core/effects/ that defines it, and a line each in core/effects/list.h and table.cpp. Fit and simulation pick it up from there.
 struct Effect {
@@ -56,7 +56,7 @@ struct Effect {
   Needs needs = Needs::any_rig;
 };
 
-/// All effects, in the order of formats.md, then those that it does not list.
+/// All effects, in the order in which users are shown them.
 const std::vector<Effect>& effects();
 /// By id; throws std::invalid_argument naming the choices.
 const Effect& effect(const std::string& id);

@@ -6,7 +6,7 @@
 
 namespace unrig {
 
-/// A laboratory's recording as a run file (formats.md, section 2), by a mapping:
+/// A laboratory's recording as a run file (correct/manual/run_files.md), by a mapping:
 ///
 ///     unrig_import = 1
 ///     [run]                       # the run file's head: name, kind, medium, density, speed, calibration, force_calibration
@@ -17,7 +17,7 @@ namespace unrig {
 ///     source = "Time"             # a channel of the file, with `unit` where the file gives none; time stamps become seconds since the first; or else
 ///     rate = "500 Hz"             # the sampling rate, with `start` = "0 s"
 ///     [[column]]                  # one table per column of the run
-///     name = "gauge"              # as formats.md names columns; others are read where a [[sensor]] of the rig file names them
+///     name = "gauge"              # as run files name columns; others are read where a [[sensor]] of the rig file names them
 ///     source = "Rig/Bridge"       # a channel of the file
 ///     unit = "V"                  # where the file gives none
 ///     raw = true                  # takes converter counts as they are, in the unit "1", for a calibration in N per count

@@ -5,7 +5,7 @@
 
 namespace unrig {
 
-/// diagnosis.json (formats.md, section 4), the winning fit in it as `fit`, the sets that were tried as `ranking`.
+/// diagnosis.json (correct/manual/results.md), the winning fit in it as `fit`, the sets that were tried as `ranking`.
 std::string to_json(const Diagnosis& diagnosis);
 
 /// For a person: the verdict first, then the evidence.

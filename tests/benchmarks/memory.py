@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Peak memory of the commands on long records, as the README's tables.
+"""Peak memory of the commands on long records, as the table of README.md beside this file.
 
   python3 tests/benchmarks/memory.py build/unrig [samples ...]
 

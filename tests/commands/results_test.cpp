@@ -1,4 +1,4 @@
-// What the commands write: keys, names and headers that files and scripts outside the project depend on (sample_data/README.md, File formats).
+// What the commands write: keys, names and headers that files and scripts outside the project depend on (correct/manual/results.md).
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

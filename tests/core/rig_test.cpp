@@ -9,7 +9,7 @@
 
 #include "core/beam_flexibility.h"
 #include "core/text_file.h"
-#include "tests/support/shared_data.h"
+#include "tests/support/sample_data.h"
 #include "tests/support/temporary_directory.h"
 
 namespace unrig {
@@ -224,14 +224,12 @@ TEST(RigFlexibility, SmallAsymmetryIsAveraged) {
 }
 
 TEST(RigFlexibility, OfTheSeedIsAcceptedAndItsScanSlipsAreNot) {
-  const std::string file = "campaigns/open/null/rig.toml";
-  UNRIG_NEEDS_SHARED(file);
-  const Rig rig = read_rig(test::shared_path(file));
+  const Rig rig = read_rig(test::null_campaign("rig.toml"));
   EXPECT_EQ(rig.station.size(), 17);
   EXPECT_EQ(rig.torsion.inertia.size(), 13);
   // Checked in double precision by another program: -1.7318e-3, within 17 x 5e-4 = 8.5e-3.
   EXPECT_THAT(rig.warnings, ElementsAre(HasSubstr("the smallest -0.00173")));
-  // As scanned, 1706 reads 17.6 (errata, 3); set on both sides of the diagonal it is no slip of symmetry any more.
+  // As scanned, 1706 reads 17.6; set on both sides of the diagonal it is no slip of symmetry any more.
   const std::string slip = replaced(read_text(rig.file), "1241, 1706", "1241, 17.6");
   EXPECT_THAT(refusal(slip), HasSubstr("not symmetric"));
   EXPECT_THAT(refusal(replaced(slip, "1273, 1706", "1273, 17.6")), HasSubstr("not positive definite"));

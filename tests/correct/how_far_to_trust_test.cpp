@@ -54,7 +54,7 @@ TEST(HowFarToTrust, LeavesATableOfNumbersWhereNothingIsToBeWarnedOf) {
     EXPECT_TRUE(HowFarToTrust::of_table(table).warnings.empty());
     EXPECT_EQ(HowFarToTrust::of_table(table).no_answer, "");
   }
-  // The first line is the header that formats.md promises.
+  // The first line is the header that correct/manual/results.md promises.
   EXPECT_TRUE(to_csv(r).starts_with("time [s],semichords,gauge [N],normal_force [N],normal_force_std [N],circulatory [N],circulatory_std [N],cn,cn_std,"));
   EXPECT_TRUE(to_indicial_csv(r).starts_with("semichords,indicial,indicial_std,"));
 }

@@ -1,5 +1,5 @@
 #!/bin/sh
-# install_test.sh BUILD: installs what BUILD holds into BUILD/installed, builds the README's example programs against it, and runs them.
+# install_test.sh BUILD: installs what BUILD holds into BUILD/installed, builds the manual's example programs against it, and runs them.
 set -eu
 source=$(cd "$(dirname "$0")/../.." && pwd)
 build=$1
@@ -12,14 +12,17 @@ cmake --build "$build/examples"
 "$build/examples/fit_rig" "$campaign/rig.toml" "$build/examples/fit.json" "$campaign/dry_pluck.csv" "$campaign/wet_pluck.csv" "$campaign/step_a.csv"
 "$build/examples/corrected_load" "$campaign/rig.toml" "$build/examples/fit.json" "$campaign/step_a.csv"
 
-# The README shows these very programs.
+# The manual shows these very programs.
 for example in frequencies fit_rig corrected_load; do
   awk '/^int main/,/^}/' "$source/tests/examples/$example.cpp" | while IFS= read -r line; do
-    grep -qF -- "$line" "$source/README.md" || { echo "README.md lacks a line of $example.cpp: $line" >&2; exit 1; }
+    grep -qF -- "$line" "$source/correct/manual/library.md" || { echo "correct/manual/library.md lacks a line of $example.cpp: $line" >&2; exit 1; }
   done
 done
 
-# Manual and completion come along.
+# Manual, manual page and completion come along.
+for page in "$source"/correct/manual/*; do
+  cmp "$page" "$build/installed/share/doc/unrig/manual/$(basename "$page")"
+done
 test -s "$build/installed/share/man/man1/unrig.1"
 for command in $("$build/installed/bin/unrig" --help | sed -n 's/^  \([a-z][a-z-]*\) .*/\1/p'); do
   grep -q "^.SH unrig $(echo "$command" | sed 's/-/\\\\-/g')$" "$build/installed/share/man/man1/unrig.1" || { echo "the manual lacks $command" >&2; exit 1; }

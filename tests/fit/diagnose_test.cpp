@@ -32,7 +32,7 @@ Diagnosis diagnose_campaign(const std::string& name) {
 }
 
 /// The verdict of the key, parameters within three standard errors of it, fitted and held-out runs down to the noise of the key (reduced chi-square at most 1.2:
-/// the bounds of the task).
+/// the bounds that the project promises).
 void expect_verdict(const std::string& name, const std::map<std::string, double>& truth) {
   const nlohmann::json key = nlohmann::json::parse(read_text(campaigns + "KEY.json"))[name];
   const Diagnosis d = diagnose_campaign(name);

@@ -22,7 +22,7 @@ FitProblem campaign(const std::string& name, const std::string& effect_id) {
   return problem;
 }
 
-/// Every parameter within three of its standard errors of the key, and every run down to the noise (the bounds of the task).
+/// Every parameter within three of its standard errors of the key, and every run down to the noise (the bounds that the project promises).
 void expect_recovered(const std::string& name, const std::string& effect_id, const std::map<std::string, double>& effect_truth) {
   const nlohmann::json key = nlohmann::json::parse(read_text(campaigns + "KEY.json"))[name];
   std::map<std::string, double> truth = {{"normal.stiffness_scale", key["truth"]["kn"]},

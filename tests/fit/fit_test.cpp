@@ -74,7 +74,7 @@ TEST(Fit, OfTheCampaignWithoutHiddenEffectsFindsItsRig) {
   const FitResult result = fit(null_problem(five_runs));
   EXPECT_TRUE(result.converged) << result.message;
   const json answers = key();
-  // The bounds are those that the project promises (kn 0.3 %, kt 1 %, Ca 1 %, zeta_n 5 %, slopes 1 %); what is measured is in the README.
+  // The bounds are those that the project promises (kn 0.3 %, kt 1 %, Ca 1 %, zeta_n 5 %, slopes 1 %); what is measured is in tests/VALIDATION.md.
   const auto check = [&](const FittedParameter& p, double truth, double bound) {
     EXPECT_TRUE(p.identified) << p.name << " " << p.run;
     EXPECT_NEAR(p.value / truth, 1, bound) << p.name << " " << p.run;

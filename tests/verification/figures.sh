@@ -2,7 +2,7 @@
 # The seed's Figures 4.1a, 4.1b and 4.2, and the open question of its section 4.2.3: simulated runs as CSV, and pictures of them.
 #
 #   sh tests/verification/figures.sh              into build/figures; needs build/unrig
-#   sh tests/verification/figures.sh DIRECTORY    into another one, such as tests/verification/figures for the pictures of the README
+#   sh tests/verification/figures.sh DIRECTORY    into another one, such as tests/verification/figures for the pictures of README.md beside this file
 #
 # UNRIG and PYTHON name other programs than build/unrig and python3. The pictures need Matplotlib and NumPy (Debian: python3-matplotlib).
 set -eu

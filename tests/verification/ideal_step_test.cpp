@@ -143,7 +143,7 @@ TEST(IdealStep, OfTheRigSolvesItsEquations) {
 }
 
 TEST(IdealStep, RootsAgreeWithAnIndependentCalculation) {
-  // facts.json, "checked_here": one normal and one torsional mode, mass centres of elements 13 and 14 on the axis; to half of the last
+  // By another program: one normal and one torsional mode, mass centres of elements 13 and 14 on the axis; to half of the last
   // digit.
   Rig rig = seed::rig();
   rig.mass_centre[12] = rig.mass_centre[13] = 0;

@@ -25,7 +25,7 @@ TEST(Modes, FrequenciesInVacuum) {
   const VectorXd normal = hertz(chain_modes(rig.normal)), torsion = hertz(chain_modes(rig.torsion));
   EXPECT_NEAR(normal[0], 7.74, 0.01) << "printed; 7.749 here, twice half a printed digit away: masses 10 to 14 are recovered";
   EXPECT_NEAR(torsion[0], 97.38, 0.4) << "printed; 97.01 here: the inertia of element 13 is recovered";
-  // An independent calculation with the same matrices (errata, point 7, and facts.json), to half of its last digit.
+  // An independent calculation with the same matrices (by another program, in double precision), to half of its last digit.
   EXPECT_NEAR(normal[0], 7.749, 5e-4);
   EXPECT_NEAR(normal[1], 33.096, 5e-4);
   EXPECT_NEAR(normal[2], 100.52, 5e-3);

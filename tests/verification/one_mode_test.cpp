@@ -138,7 +138,7 @@ TEST_F(OneModeDynamic, FromTwoModesOnForceSummationConvergesFaster) {
     }
   }
   EXPECT_GT(error(1, Judged::by_forces), error(1, Judged::by_curvature));
-  // To 1e-3 of the reading: five modes by forces, seven by curvature (errata, point 7, has eight, by its own measure).
+  // To 1e-3 of the reading: five modes by forces, seven by curvature.
   EXPECT_LT(error(5, Judged::by_forces), 1e-3);
   EXPECT_GT(error(4, Judged::by_forces), 1e-3);
   EXPECT_LT(error(7, Judged::by_curvature), 1e-3);

@@ -122,7 +122,7 @@ TEST(FrequenciesInWater, TheTorsionalOneIsNotConverged) {
 }
 
 TEST(FrequenciesInWater, ConvergeSlowlyInAThinBasis) {
-  // errata, point 7: 15.37 Hz with two modes, 15.10 with four; 52.7, 49.5, 49.27 Hz for the third with three, four and five. That rig has
+  // By another program: 15.37 Hz with two modes, 15.10 with four; 52.7, 49.5, 49.27 Hz for the third with three, four and five. That rig has
   // the mass centres of elements 13 and 14 on the axis; half of the last digit.
   Rig rig = seed::rig();
   rig.mass_centre[12] = rig.mass_centre[13] = 0;
@@ -147,7 +147,7 @@ TEST(SmallSums, ReducedRateAndLengths) {
 }
 
 TEST(SmallSums, TheWaterWeighsSixTimesTheAirfoil) {
-  // pi rho b^2 against the airfoil's 0.1598 lb/in (errata, point 7, says three times).
+  // pi rho b^2 against the airfoil's 0.1598 lb/in.
   EXPECT_NEAR(pi * density * semichord * semichord / 0.1598, 6.39, 5e-3);
   const Equations e = printed_equations();
   EXPECT_NEAR((e.lq / 2) / (e.m - e.lq / 2), 6.1, 0.1) << "in the first mode";

@@ -63,7 +63,7 @@ Transform solve_appendix_b_input();
 
 Eigen::VectorXcd roots(const Eigen::VectorXd& polynomial);
 
-/// The constants of Table 1 in the form of facts.json:
+/// The constants of Table 1 in the form
 /// A + B exp(-.29 t) + C exp(-.0454 t) + exp(-.42 t)(D sin 2.29 t + E cos 2.29 t) + exp(-.825 t)(F sin 49.75 t + G cos 49.75 t)
 struct Constants {
   double A, B, C, D, E, F, G;

@@ -3,7 +3,7 @@
 
 namespace unrig::seed {
 
-/// The README's table "The seed, number by number", in Markdown: every line computed here, none written by hand.
+/// The table "The seed, number by number" of README.md beside this file, in Markdown: every line computed here, none written by hand.
 std::string number_by_number();
 
 }  // namespace unrig::seed

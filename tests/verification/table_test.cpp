@@ -1,4 +1,4 @@
-// The README's table of the seed's numbers is the one computed here. tests/verification/table.sh prints it.
+// The table of the seed's numbers in README.md beside this file is the one computed here. tests/verification/table.sh prints it.
 
 #include "tests/verification/table.h"
 
@@ -12,9 +12,9 @@ namespace unrig::seed {
 namespace {
 
 TEST(SeedTable, StandsInTheReadme) {
-  const std::string table = number_by_number(), readme = read_text(std::string(UNRIG_SOURCE_DIR) + "/README.md");
+  const std::string table = number_by_number(), readme = read_text(std::string(UNRIG_SOURCE_DIR) + "/tests/verification/README.md");
   const bool stands = readme.find(table) != std::string::npos;
-  EXPECT_TRUE(stands) << "Put the lines that `sh tests/verification/table.sh` prints in place of the table of README.md.";
+  EXPECT_TRUE(stands) << "Put the lines that `sh tests/verification/table.sh` prints in place of the table of tests/verification/README.md.";
 }
 
 /// Run by table.sh alone: standard output is the table.
