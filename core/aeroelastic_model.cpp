@@ -10,6 +10,7 @@
 #include <fmt/format.h>
 
 #include "core/effects/effect.h"
+#include "core/gauge_lever.h"
 
 namespace unrig {
 namespace {
@@ -80,12 +81,6 @@ Strips strips_of(const Rig& rig, const Kinematics& k) {
     strips.twist.row(s) = k.twist.row(rig.submerged[static_cast<std::size_t>(s)] - 1);
   }
   return strips;
-}
-
-/// Lever of each element about the gauge over the lever of the calibration station; 0 inboard of the gauge.
-RowVectorXd gauge_arms(const Rig& rig) {
-  const double gauge = rig.station[rig.gauge_element - 1];
-  return ((rig.station.array() - gauge).max(0.0) / (rig.station[rig.calibration_element - 1] - gauge)).matrix().transpose();
 }
 
 /// Column positions of the extended coordinates' displacement, rate and acceleration in the state and the inputs.
@@ -348,7 +343,7 @@ LinearSystem AeroelasticModel::beam_system(const Conditions& conditions, const V
   for (std::size_t c = 0; c < channels.size(); ++c) {
     const auto row = static_cast<Index>(c);
     if (channels[c] == "gauge") {
-      const RowVectorXd arms = gauge_arms(rig_);
+      const RowVectorXd arms = gauge_levers(rig_);
       const auto inertial = [&](const VectorXd& m, const MatrixXd& moves) -> MatrixXd { return arms * m.asDiagonal() * moves; };
       const MatrixXd mass_centre = k.normal - MatrixXd(rig_.mass_centre.asDiagonal() * k.twist);
       const MatrixXd midchord = k.normal + rig_.axis() * b * k.twist;
