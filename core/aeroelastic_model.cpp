@@ -150,7 +150,7 @@ void keep_inputs(LinearSystem& system, const Conditions& conditions) {
     for (std::size_t k = 0; k < kept.size(); ++k) part.set_block(0, static_cast<Index>(k), m->block(0, kept[k], m->rows(), 1));
     *m = std::move(part);
   }
-  for (Feedback& f : system.feedback) f.sees.conservativeResizeLike(RowVectorXd::Zero(system.states()));  // states that came later
+  for (Feedback& f : system.feedback) f.sees.conservativeResizeLike(MatrixXd::Zero(f.sees.rows(), system.states()));  // states that came later
 }
 
 }  // namespace
