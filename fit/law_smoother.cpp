@@ -77,6 +77,8 @@ void LawSmoother::prepare(const VectorXd& theta) {
     disturb_ << gamma0_ + gamma1_, exact_.dt * MatrixXd::Identity(states_, states_).middleCols(system_.coordinates, system_.coordinates);
   }
   arguments_ = Arguments(system_);
+  before_ = gamma0_(Eigen::all, arguments_.owner);
+  behind_ = gamma1_(Eigen::all, arguments_.owner);
 }
 
 VectorXd LawSmoother::enough_to_move(const VectorXd& theta) {
@@ -143,16 +145,16 @@ MatrixXd LawSmoother::moved_by_theta() const {
 void LawSmoother::write_step(Index k, const Eigen::Ref<const MatrixXd>& moved) {
   const Index given = system_.B.cols() - laws_;
   const auto now = slope_.col(k), then = slope_.col(k + 1);
-  const MatrixXd &sees = arguments_.sees, before = gamma0_(Eigen::all, arguments_.owner), behind = gamma1_(Eigen::all, arguments_.owner);  // a column per argument
+  const MatrixXd& sees = arguments_.sees;
   MatrixXd& step = ahead_[static_cast<std::size_t>(k)];
   step.resize(states_, states_ + disturbances_ + changes_ + 1);
-  step.leftCols(states_) = exact_.transition.value + before * now.asDiagonal() * sees;
+  step.leftCols(states_) = exact_.transition.value + before_ * now.asDiagonal() * sees;
   step.middleCols(states_, disturbances_) = disturb_;
   step.middleCols(states_ + disturbances_, changes_) = moved + gamma0_ * law_partials(k) + gamma1_ * law_partials(k + 1);
-  step.rightCols(1) = gamma0_ * force_.col(k) - before * now.cwiseProduct(sees * state_.col(k)) + gamma1_ * force_.col(k + 1) - behind * then.cwiseProduct(sees * state_.col(k + 1));
+  step.rightCols(1) = gamma0_ * force_.col(k) - before_ * now.cwiseProduct(sees * state_.col(k)) + gamma1_ * force_.col(k + 1) - behind_ * then.cwiseProduct(sees * state_.col(k + 1));
   if (given > 0) step.rightCols(1) += exact_.input0.value.leftCols(given) * inputs_.row(k).transpose() + exact_.input1.value.leftCols(given) * inputs_.row(k + 1).transpose();
   if (followed_ && laws_ > 0) {  // (1 - gamma1 slope sees)^-1, of low rank
-    const MatrixXd pushed = behind * then.asDiagonal();
+    const MatrixXd pushed = behind_ * then.asDiagonal();
     step += pushed * (MatrixXd::Identity(pushed.cols(), pushed.cols()) - sees * pushed).partialPivLu().solve(sees * step);
   }
 }

@@ -65,6 +65,7 @@ class LawSmoother {
   ExactStep exact_;
   Eigen::Index readings_ = 0, parts_ = 1, samples_ = 0, channels_ = 0, changes_ = 0, states_ = 0, laws_ = 0, disturbances_ = 0;
   Eigen::MatrixXd gamma0_, gamma1_, disturb_;
+  Eigen::MatrixXd before_, behind_;  ///< gamma0_ and gamma1_ with a column per argument
   Arguments arguments_;
 
   bool followed_ = false;
