@@ -10,6 +10,7 @@
 #include <fmt/format.h>
 
 #include "core/effects/effect.h"
+#include "core/gauge_lever.h"
 
 namespace unrig {
 namespace {
@@ -82,12 +83,6 @@ Strips strips_of(const Rig& rig, const Kinematics& k) {
   return strips;
 }
 
-/// Lever of each element about the gauge over the lever of the calibration station; 0 inboard of the gauge.
-RowVectorXd gauge_arms(const Rig& rig) {
-  const double gauge = rig.station[rig.gauge_element - 1];
-  return ((rig.station.array() - gauge).max(0.0) / (rig.station[rig.calibration_element - 1] - gauge)).matrix().transpose();
-}
-
 /// Column positions of the extended coordinates' displacement, rate and acceleration in the state and the inputs.
 /// Prescribed coordinates have theirs in the motion states (pitch) and in the inputs (heave).
 struct Layout {
@@ -155,7 +150,7 @@ void keep_inputs(LinearSystem& system, const Conditions& conditions) {
     for (std::size_t k = 0; k < kept.size(); ++k) part.set_block(0, static_cast<Index>(k), m->block(0, kept[k], m->rows(), 1));
     *m = std::move(part);
   }
-  for (Feedback& f : system.feedback) f.sees.conservativeResizeLike(RowVectorXd::Zero(system.states()));  // states that came later
+  for (Feedback& f : system.feedback) f.sees.conservativeResizeLike(MatrixXd::Zero(f.sees.rows(), system.states()));  // states that came later
 }
 
 }  // namespace
@@ -348,7 +343,7 @@ LinearSystem AeroelasticModel::beam_system(const Conditions& conditions, const V
   for (std::size_t c = 0; c < channels.size(); ++c) {
     const auto row = static_cast<Index>(c);
     if (channels[c] == "gauge") {
-      const RowVectorXd arms = gauge_arms(rig_);
+      const RowVectorXd arms = gauge_levers(rig_);
       const auto inertial = [&](const VectorXd& m, const MatrixXd& moves) -> MatrixXd { return arms * m.asDiagonal() * moves; };
       const MatrixXd mass_centre = k.normal - MatrixXd(rig_.mass_centre.asDiagonal() * k.twist);
       const MatrixXd midchord = k.normal + rig_.axis() * b * k.twist;

@@ -34,15 +34,17 @@ struct Conditions {
   double nyquist = 0;  ///< Hz, half the sampling rate; 0: not known
 };
 
-/// A static nonlinear force f(z) that rides on the linear system: it drives one input column and looks at one combination of the states.
+/// A static nonlinear function f(z) that rides on the linear system: it drives one input column and looks at a few combinations of the states, its arguments
+/// z = sees x. A law with memory has it as a state of its own, whose rate is such a function (append_memory in core/effects/effect.h).
 struct Feedback {
-  Eigen::RowVectorXd sees;          ///< z = sees x, a displacement or a rate
+  Eigen::MatrixXd sees;             ///< arguments x states: displacements, rates, memories
   Eigen::Index first_parameter = 0; ///< of the law, in theta
   Eigen::Index parameters = 0;
-  /// f(z) for the parameters p, and its derivatives in z and in each of p.
-  double (*law)(double z, const double* p, double& slope, double* partial) = nullptr;
+  /// f(z) for the parameters p; writes its derivatives in each of z and in each of p.
+  using Law = double (*)(const double* z, const double* p, double* slope, double* partial);
+  Law law = nullptr;
   /// For searches, the same with its corners rounded; none where it has no corners.
-  double (*rounded)(double z, const double* p, double& slope, double* partial) = nullptr;
+  Law rounded = nullptr;
   Eigen::Index steps_per_sample = 1;  ///< in which its response is followed: more where z crosses a corner of the law within a sample
 };
 

@@ -14,7 +14,7 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-// A handful of feedbacks, so that a step allocates nothing.
+// A handful of feedbacks and of arguments, so that a step allocates nothing. M: how many there are of both, where that is known.
 constexpr int most_feedbacks = 16;
 template <int M>
 using Few = Eigen::Matrix<double, M, 1, 0, M == Eigen::Dynamic ? most_feedbacks : M, 1>;
@@ -25,30 +25,34 @@ using FewSquare = Eigen::Matrix<double, M, M, 0, M == Eigen::Dynamic ? most_feed
 template <int M>
 class Laws {
  public:
-  Laws(const LinearSystem& system, const VectorXd& theta) : system_(system), theta_(theta) {
-    const auto count = static_cast<Index>(system.feedback.size());
-    force = slope = Few<M>::Zero(count);
+  Laws(const LinearSystem& system, const Arguments& arguments, const VectorXd& theta) : system_(system), arguments_(arguments), theta_(theta) {
+    force = Few<M>::Zero(static_cast<Index>(system.feedback.size()));
+    slope = Few<M>::Zero(arguments.count());
   }
+  /// At the arguments z of all feedbacks in turn.
   void at(const Few<M>& z) {
-    for (Index i = 0; i < z.size(); ++i) {
-      const FeedbackForce f = force_of(system_.feedback[static_cast<std::size_t>(i)], z[i], theta_);
-      force[i] = f.value;
-      slope[i] = f.slope;
+    for (std::size_t i = 0; i < system_.feedback.size(); ++i) {
+      const Index first = arguments_.first[i], count = system_.feedback[i].sees.rows();
+      const FeedbackForce f = force_of(system_.feedback[i], z.data() + first, theta_);
+      force[static_cast<Index>(i)] = f.value;
+      for (Index a = 0; a < count; ++a) slope[first + a] = f.slope[static_cast<std::size_t>(a)];
     }
   }
   /// d force / d theta at z, feedbacks x P.
   void partials_at(const Few<M>& z, Eigen::Ref<MatrixXd> partials) const {
     partials.setZero();
-    for (Index i = 0; i < z.size(); ++i) {
-      const Feedback& f = system_.feedback[static_cast<std::size_t>(i)];
-      const FeedbackForce at_z = force_of(f, z[i], theta_);
-      for (Index k = 0; k < f.parameters; ++k) partials(i, f.first_parameter + k) = at_z.partial[static_cast<std::size_t>(k)];
+    for (std::size_t i = 0; i < system_.feedback.size(); ++i) {
+      const Feedback& f = system_.feedback[i];
+      const FeedbackForce at_z = force_of(f, z.data() + arguments_.first[i], theta_);
+      for (Index k = 0; k < f.parameters; ++k) partials(static_cast<Index>(i), f.first_parameter + k) = at_z.partial[static_cast<std::size_t>(k)];
     }
   }
-  Few<M> force, slope;
+  Few<M> force;  ///< of each feedback
+  Few<M> slope;  ///< in each argument, of the feedback whose it is
 
  private:
   const LinearSystem& system_;
+  const Arguments& arguments_;
   const VectorXd& theta_;
 };
 
@@ -60,9 +64,9 @@ Few<M> solve_few(const FewSquare<M>& matrix, const Few<M>& right) {
     return matrix.partialPivLu().solve(right);
 }
 
-/// z with z = known + gain f(z): Newton's method, halved where the residual does not fall.
+/// z with z = known + gain f(z): Newton's method, halved where the residual does not fall. `by_argument`: the column of `gain` for each argument's feedback.
 template <int M>
-Few<M> implicit_argument(Laws<M>& laws, const Few<M>& known, const FewSquare<M>& gain, Few<M> z) {
+Few<M> implicit_argument(Laws<M>& laws, const Few<M>& known, const FewSquare<M>& gain, const FewSquare<M>& by_argument, Few<M> z) {
   constexpr int most = 60;
   const Index m = z.size();
   const auto residual_of = [&](const Few<M>& at) -> Few<M> {
@@ -73,7 +77,7 @@ Few<M> implicit_argument(Laws<M>& laws, const Few<M>& known, const FewSquare<M>&
   for (int i = 0; i < most; ++i) {
     const double size = residual.norm(), scale = 1e-13 * (known.norm() + z.norm()) + 1e-300;
     if (!(size > scale)) return z;
-    const Few<M> step = solve_few<M>(FewSquare<M>::Identity(m, m) - gain * laws.slope.asDiagonal(), residual);
+    const Few<M> step = solve_few<M>(FewSquare<M>::Identity(m, m) - by_argument * laws.slope.asDiagonal(), residual);
     double fraction = 1;
     Few<M> next = z - step, after = residual_of(next);
     while (!(after.norm() < size) && fraction > 1e-4) {
@@ -93,7 +97,7 @@ Few<M> implicit_argument(Laws<M>& laws, const Few<M>& known, const FewSquare<M>&
 /// All that one sample step does linearly, as one matrix from v = [x; f; jerk; u now; u next] to [x without the force at the end of the step; what the laws see
 /// of that; outputs now]. The rows are padded for small_product.
 struct StepMatrices {
-  Index states, feedbacks, channels, measured, parameters;
+  Index states, feedbacks, arguments, channels, measured, parameters;
   MatrixXd step;     // rows x inputs
   MatrixXd late;     // rows x feedbacks: what the force at the end of the step adds
   MatrixXd partial;  // (rows P) x inputs, parameter by parameter
@@ -104,10 +108,11 @@ struct StepMatrices {
   Index force() const { return states; }
   Index jerk() const { return states + feedbacks; }
   Index input() const { return jerk() + 1; }
-  Index output() const { return states + feedbacks; }
+  Index argument() const { return states; }
+  Index output() const { return states + arguments; }
 
   StepMatrices(const LinearSystem& system, const ExactStep& exact, const MatrixXd& sees, Index parameter_count)
-      : states(system.states()), feedbacks(sees.rows()), channels(system.C.rows()), measured(system.B.cols() - feedbacks), parameters(parameter_count) {
+      : states(system.states()), feedbacks(static_cast<Index>(system.feedback.size())), arguments(sees.rows()), channels(system.C.rows()), measured(system.B.cols() - feedbacks), parameters(parameter_count) {
     const auto value = [](const DualMatrix& m) { return &m.value; };
     fill(system, exact, sees, value, step, late);
     partial.resize(parameters * rows(), inputs());
@@ -123,7 +128,7 @@ struct StepMatrices {
  private:
   template <typename Part>
   void fill(const LinearSystem& system, const ExactStep& exact, const MatrixXd& sees, Part part, MatrixXd& all, MatrixXd& at_end) const {
-    all = MatrixXd::Zero(padded_rows(states + feedbacks + channels), states + feedbacks + 1 + 2 * measured);
+    all = MatrixXd::Zero(padded_rows(states + arguments + channels), states + feedbacks + 1 + 2 * measured);
     at_end = MatrixXd::Zero(all.rows(), feedbacks);
     if (const MatrixXd* m = part(exact.transition)) all.topLeftCorner(states, states) = *m;
     if (const MatrixXd* m = part(exact.input0)) {
@@ -136,8 +141,8 @@ struct StepMatrices {
     }
     if (exact.jerk.value.size() > 0)
       if (const MatrixXd* m = part(exact.jerk)) all.col(jerk()).head(states) = m->col(0);
-    all.middleRows(states, feedbacks) = sees * all.topRows(states);
-    at_end.middleRows(states, feedbacks) = sees * at_end.topRows(states);
+    all.middleRows(argument(), arguments) = sees * all.topRows(states);
+    at_end.middleRows(argument(), arguments) = sees * at_end.topRows(states);
     if (const MatrixXd* m = part(system.C)) all.block(output(), 0, channels, states) = *m;
     if (const MatrixXd* m = part(system.D)) {
       all.block(output(), force(), channels, feedbacks) = m->rightCols(feedbacks);
@@ -160,12 +165,13 @@ class Follower {
         per_sample_(steps_per_sample(system)),
         samples_(samples),
         steps_(samples * per_sample_),
-        laws_(system, theta),
-        sees_(rows_seen(system)),
-        one_(system, exact, sees_, partials == Partials::all ? system.A.parameters() : 0),
+        arguments_(system),
+        laws_(system, arguments_, theta),
+        one_(system, exact, arguments_.sees, partials == Partials::all ? system.A.parameters() : 0),
         directions_(drive.start_tangent.cols()),
         columns_(directions_ + one_.parameters),
-        gain_(one_.late.middleRows(one_.force(), one_.feedbacks)) {}
+        gain_(one_.late.middleRows(one_.argument(), one_.arguments)),
+        by_argument_(gain_(Eigen::all, arguments_.owner)) {}
 
   NonlinearResponse run() {
     begin();
@@ -185,20 +191,14 @@ class Follower {
  private:
   static constexpr Index most_at_a_time = 256;
 
-  static MatrixXd rows_seen(const LinearSystem& system) {
-    MatrixXd sees(static_cast<Index>(system.feedback.size()), system.states());
-    for (Index i = 0; i < sees.rows(); ++i) sees.row(i) = system.feedback[static_cast<std::size_t>(i)].sees;
-    return sees;
-  }
-
   void begin() {
     const Index n = one_.states, m = one_.feedbacks, block = std::min(most_at_a_time, steps_);
     response_.output.resize(samples_, one_.channels);
     response_.tangent.assign(static_cast<std::size_t>(columns_ > 0 ? one_.channels : 0), MatrixXd(samples_, columns_));
     now_ = MatrixXd::Zero(one_.inputs(), block + 1);
-    slope_ = MatrixXd::Zero(m, block + 1);
+    slope_ = MatrixXd::Zero(one_.arguments, block + 1);
     stepped_ = VectorXd::Zero(one_.rows());
-    z_ = sees_ * drive_.start;
+    z_ = arguments_.sees * drive_.start;
     laws_.at(z_);
     now_.col(0).head(n) = drive_.start;
     now_.col(0).segment(one_.force(), m) = laws_.force;
@@ -209,7 +209,7 @@ class Follower {
     tangent_ = next_ = MatrixXd::Zero(std::max(one_.rows(), one_.input()), columns_);  // the jerk is that of the sample
     if (directions_ > 0) tangent_.topLeftCorner(n, directions_) = drive_.start_tangent;
     if (one_.parameters > 0 && drive_.start_partial.size() > 0) tangent_.topRightCorner(n, one_.parameters) = drive_.start_partial;
-    tangent_.middleRows(one_.force(), m) = slope_.col(0).asDiagonal() * (sees_ * tangent_.topRows(n));
+    tangent_.middleRows(one_.force(), m) = by_feedback(slope_.col(0).asDiagonal() * (arguments_.sees * tangent_.topRows(n)));
     tangent_.block(one_.force(), directions_, m, one_.parameters) += law_partials(0);
   }
 
@@ -229,10 +229,10 @@ class Follower {
       }
       small_product(one_.step.data(), one_.rows(), one_.inputs(), v.data(), 0, 1, stepped_.data(), 0);
       if (part == 0) response_.output.row(sample) = stepped_.segment(one_.output(), one_.channels).transpose();
-      z_ = implicit_argument<M>(laws_, stepped_.segment(n, m), gain_, z_);
+      z_ = implicit_argument<M>(laws_, stepped_.segment(one_.argument(), one_.arguments), gain_, by_argument_, z_);
       next.head(n) = stepped_.head(n);
       for (Index i = 0; i < m; ++i) {
-        const double force = laws_.force[i], z = z_[i];
+        const double force = laws_.force[i], z = z_[arguments_.first[static_cast<std::size_t>(i)]];
         next.head(n) += force * one_.late.col(i).head(n);
         next[one_.force() + i] = force;
         largest_[i] = std::max(largest_[i], std::abs(z));
@@ -297,7 +297,7 @@ class Follower {
     if (straight_.size() == most) straight_.erase(straight_.begin());
     const Index n = one_.states, m = one_.feedbacks, size = one_.input();
     MatrixXd step = MatrixXd::Identity(size, size);
-    step.middleRows(n, m) = answer_of(slope) * one_.step.block(n, 0, m, size);
+    step.middleRows(n, m) = by_feedback(answer_of(slope) * one_.step.block(one_.argument(), 0, one_.arguments, size));
     step.topRows(n) = one_.step.topLeftCorner(n, size) + one_.late.topRows(n) * step.middleRows(n, m);
     const MatrixXd all = power(step, per_sample_);
     MatrixXd over_sample = MatrixXd::Zero(one_.rows(), size);
@@ -312,16 +312,30 @@ class Follower {
     const Index n = one_.states, m = one_.feedbacks;
     const FewSquare<M> answer = answer_of(slope);
     for (Index j = from; j < columns_; ++j) {
-      const Few<M> force = answer.lazyProduct(next_.col(j).segment(n, m));
+      const Few<M> by_argument = answer.lazyProduct(next_.col(j).segment(one_.argument(), one_.arguments));
+      const Few<M> force = of_feedbacks(by_argument);
       for (Index i = 0; i < m; ++i) next_.col(j).head(n) += force[i] * one_.late.col(i).head(n);
       next_.col(j).segment(one_.force(), m) = force;
     }
   }
 
-  /// How the force at the end of a step answers to what the laws see there without it.
+  /// How the force at the end of a step answers, by way of each argument, to what the laws see there without it.
   FewSquare<M> answer_of(const Few<M>& slope) const {
-    const Index m = one_.feedbacks;
-    return slope.asDiagonal() * inverse(FewSquare<M>::Identity(m, m) - gain_ * slope.asDiagonal());
+    const Index m = one_.arguments;
+    return slope.asDiagonal() * inverse(FewSquare<M>::Identity(m, m) - by_argument_ * slope.asDiagonal());
+  }
+
+  /// Of each feedback the sum over its arguments.
+  Few<M> of_feedbacks(const Few<M>& by_argument) const {
+    if constexpr (M == 1) return by_argument;
+    Few<M> sum = Few<M>::Zero(one_.feedbacks);
+    for (Index a = 0; a < by_argument.size(); ++a) sum[arguments_.owner[static_cast<std::size_t>(a)]] += by_argument[a];
+    return sum;
+  }
+  MatrixXd by_feedback(const MatrixXd& by_argument) const {
+    MatrixXd sum = MatrixXd::Zero(one_.feedbacks, by_argument.cols());
+    for (Index a = 0; a < by_argument.rows(); ++a) sum.row(arguments_.owner[static_cast<std::size_t>(a)]) += by_argument.row(a);
+    return sum;
   }
 
   static FewSquare<M> inverse(const FewSquare<M>& matrix) {
@@ -333,11 +347,12 @@ class Follower {
 
   const NonlinearDrive& drive_;
   Index per_sample_, samples_, steps_;
+  Arguments arguments_;
   Laws<M> laws_;
-  MatrixXd sees_;  // feedbacks x n
   StepMatrices one_;
   Index directions_, columns_;
-  FewSquare<M> gain_;  // how the force at the end of a step moves what the laws see there
+  FewSquare<M> gain_;         // arguments x feedbacks: how the force at the end of a step moves what the laws see there
+  FewSquare<M> by_argument_;  // the same for each argument's feedback
   NonlinearResponse response_;
   MatrixXd now_, slope_, law_partial_, source_, tangent_, next_;
   VectorXd stepped_, largest_;
@@ -354,7 +369,7 @@ class Follower {
 ExactStep step_to_follow(const LinearSystem& system, double dt) { return exact_step(system, dt / static_cast<double>(steps_per_sample(system))); }
 
 NonlinearResponse follow(const LinearSystem& system, const ExactStep& step, const VectorXd& theta, const NonlinearDrive& drive, Index samples, Partials partials) {
-  if (system.feedback.size() == 1) return Follower<1>(system, step, theta, drive, samples, partials).run();
+  if (system.feedback.size() == 1 && system.feedback.front().sees.rows() == 1) return Follower<1>(system, step, theta, drive, samples, partials).run();
   return Follower<Eigen::Dynamic>(system, step, theta, drive, samples, partials).run();
 }
 

@@ -23,7 +23,7 @@ struct NonlinearResponse {
   std::vector<Eigen::MatrixXd> tangent;  ///< per channel: samples x (K + P), P = 0 for Partials::none
   Eigen::VectorXd end;                   ///< n
   Eigen::MatrixXd end_tangent;           ///< n x (K + P)
-  Eigen::VectorXd largest_argument;      ///< per feedback: largest |z|
+  Eigen::VectorXd largest_argument;      ///< per feedback: largest |z| of its first argument
   bool finite = true;
 };
 

@@ -1,15 +1,14 @@
 #include "core/rigid_load.h"
 
 #include <algorithm>
-#include <numbers>
 #include <numeric>
-#include <stdexcept>
 #include <tuple>
 #include <utility>
 #include <vector>
 
 #include "core/exact_step.h"
 #include "core/response.h"
+#include "core/rigid_system.h"
 
 namespace unrig {
 namespace {
@@ -18,24 +17,6 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::RowVectorXd;
 using Eigen::VectorXd;
-
-/// Lags y' = (beta U / b) (w - y) of one strip, driven by p, p', p''.
-LinearSystem lag_system(const VectorXd& rate, double U, double b, const RowVectorXd& downwash) {
-  const Index terms = U > 0 ? rate.size() : 0, n = terms + 3;
-  LinearSystem s;
-  s.A = DualMatrix(MatrixXd::Zero(n, n));
-  for (Index k = 0; k < terms; ++k) {
-    s.A.value.row(k).tail(3) = rate[k] * U / b * downwash;
-    s.A.value(k, k) = -rate[k] * U / b;
-  }
-  s.A.value(terms, terms + 1) = s.A.value(terms + 1, terms + 2) = 1;
-  s.B = DualMatrix(MatrixXd(n, 0));
-  s.C = DualMatrix(MatrixXd::Identity(n, n));
-  s.D = DualMatrix(MatrixXd(n, 0));
-  s.lags = terms;
-  s.motion = terms;
-  return s;
-}
 
 /// State of the lags and the motion over the record, and how it moves with the motion's unknowns.
 class Lags {
@@ -149,34 +130,13 @@ class Lags {
 
 RigidLoad rigid_load(const AeroelasticModel& model, const Conditions& conditions, const VectorXd& theta, const MotionBasis& motion, double dt,
                      const VectorXd& u, std::vector<Index> slopes_at, const RigidLoad::State& from) {
-  const Rig& rig = model.rig();
-  if (rig.is_modal()) throw std::invalid_argument("a modal rig has no section to load");
-  const double b = rig.semichord(), U = conditions.speed, length = rig.strip_length * static_cast<double>(rig.submerged.size());
-  const RowVectorXd downwash = (RowVectorXd(3) << U, (0.5 - rig.axis()) * b, 0).finished();
-  const LinearSystem lags = lag_system(model.circulation().rate, U, b, downwash);
-  const ExactStep step = exact_step(lags, dt);
-  const Index n = lags.states(), samples = motion.samples();
+  const LinearSystem rigid = rigid_system(model, conditions, theta);
+  const ExactStep step = exact_step(rigid, dt);
+  const Index samples = motion.samples();
+  const DualMatrix loads = rigid.C.block(0, 0, 2, rigid.states());  // circulatory, normal_force
 
-  // Rows over the states.
-  const double slope = theta[model.index("normal_force_slope")], ca = theta[model.index("apparent_mass_coefficient")];
-  const double strength = conditions.density * U * b * length, apparent = std::numbers::pi * conditions.density * b * b * length;
-  RowVectorXd built_up = RowVectorXd::Zero(n);
-  built_up.tail(3) = downwash;
-  MatrixXd missing = MatrixXd::Zero(lags.lags, n);  // y - w of each term
-  for (Index k = 0; k < lags.lags; ++k) {
-    missing.row(k).tail(3) = -downwash;
-    missing(k, k) += 1;
-    built_up += model.circulation_amplitude(theta, k) * missing.row(k);
-  }
-  RowVectorXd inertial = RowVectorXd::Zero(n);
-  inertial[n - 1] = -apparent * rig.axis() * b;
-  RowVectorXd centrifugal = RowVectorXd::Zero(n);
-  centrifugal[n - 2] = apparent * U;
-  MatrixXd loads(2, n);
-  loads << slope * strength * built_up, slope * strength * built_up + ca * inertial + centrifugal;
-
-  const Lags state(lags, step, motion, u, from);
-  const MatrixXd all = state.follow(loads);
+  const Lags state(rigid, step, motion, u, from);
+  const MatrixXd all = state.follow(loads.value);
   RigidLoad load;
   load.circulatory = all.col(0);
   load.normal_force = all.col(1);
@@ -192,17 +152,16 @@ RigidLoad rigid_load(const AeroelasticModel& model, const Conditions& conditions
   load.normal_force_by_theta = MatrixXd::Zero(rows, theta.size());
   const Index unknowns = motion.unknowns(), carried = from.by_theta.cols();
   const auto [behind, behind_slope] = state.at(slopes_at, [&](Index i, const VectorXd& x, const MatrixXd& its_slope) {
-    load.circulatory_by_motion.row(i).noalias() = loads.row(0) * its_slope.leftCols(unknowns);
-    load.normal_force_by_motion.row(i).noalias() = loads.row(1) * its_slope.leftCols(unknowns);
-    const VectorXd still_missing = missing * x;
-    for (Index k = 0; k < lags.lags; ++k)
-      if (const Index parameter = model.circulation_parameter(k); parameter >= 0) load.circulatory_by_theta(i, parameter) = slope * strength * still_missing[k];
-    load.circulatory_by_theta(i, model.index("normal_force_slope")) = strength * built_up.dot(x);
-    load.normal_force_by_theta.row(i) = load.circulatory_by_theta.row(i);
-    load.normal_force_by_theta(i, model.index("apparent_mass_coefficient")) += inertial.dot(x);
+    load.circulatory_by_motion.row(i).noalias() = loads.value.row(0) * its_slope.leftCols(unknowns);
+    load.normal_force_by_motion.row(i).noalias() = loads.value.row(1) * its_slope.leftCols(unknowns);
+    for (Index j = 0; j < theta.size(); ++j) {
+      if (!loads.depends_on(j)) continue;
+      load.circulatory_by_theta(i, j) = loads.d(j).row(0).dot(x);
+      load.normal_force_by_theta(i, j) = loads.d(j).row(1).dot(x);
+    }
     if (carried == 0) return;
-    load.circulatory_by_theta.row(i) += loads.row(0) * its_slope.rightCols(carried);
-    load.normal_force_by_theta.row(i) += loads.row(1) * its_slope.rightCols(carried);
+    load.circulatory_by_theta.row(i) += loads.value.row(0) * its_slope.rightCols(carried);
+    load.normal_force_by_theta.row(i) += loads.value.row(1) * its_slope.rightCols(carried);
   });
   load.behind = {behind, behind_slope.leftCols(unknowns), behind_slope.rightCols(carried)};
   return load;

@@ -14,8 +14,8 @@ namespace unrig {
 ///   moment        (1/2 + a) b circulatory - C_a pi rho b^4 l (1/8 + a^2) p'' - (1/2 - a) pi rho b^3 l U p'   (Eq. 2.13, 2.15)
 ///
 /// about the pitch axis, nose up. States: one lag per term of the circulation, then angle, rate and acceleration; outputs in the order
-/// above. It takes the same motions as the flexible rig, ideal steps included; core/rigid_load.h has its load with derivatives for the
-/// correction. Throws std::invalid_argument for a rig that is known only as modes.
+/// above, with exact partials in slope, C_a and free amplitudes of the circulation. It takes the same motions as the flexible rig, ideal steps
+/// included. Throws std::invalid_argument for a rig that is known only as modes.
 LinearSystem rigid_system(const AeroelasticModel& model, const Conditions& conditions, const Eigen::VectorXd& theta);
 
 /// What `motion` does to a system that carries the pitch, from rest: samples x outputs, exact for a motion whose jerk is constant over each

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "core/exact_step.h"
+#include "core/gauge_lever.h"
 #include "core/ideal_step.h"
 #include "core/motion.h"
 #include "core/nonlinear_response.h"
@@ -191,14 +192,6 @@ void warn_of_noise(const VectorXd& angle, std::vector<std::string>& warnings) {
 }
 
 }  // namespace
-
-double gauge_reading_of_unit_coefficient(const Rig& rig, double density, double speed) {
-  const double gauge = rig.station[rig.gauge_element - 1], lever = rig.station[rig.calibration_element - 1] - gauge;
-  double reading = 0;
-  for (const int element : rig.submerged)
-    reading += density * speed * speed * rig.semichord() * rig.strip_length * std::max(0.0, rig.station[element - 1] - gauge) / lever;
-  return reading;
-}
 
 SimulateResult simulate(const SimulateProblem& problem) {
   const Run& run = problem.run;

@@ -49,7 +49,4 @@ struct SimulateResult {
 /// nonlinear response is not finite.
 SimulateResult simulate(const SimulateProblem& problem);
 
-/// What the gauge reads, per unit normal-force coefficient N / (rho U^2 b l) on every strip [N].
-double gauge_reading_of_unit_coefficient(const Rig& rig, double density, double speed);
-
 }  // namespace unrig

@@ -10,6 +10,7 @@
 #include <fmt/format.h>
 
 #include "core/effects/effect.h"
+#include "core/gauge_lever.h"
 #include "core/in_parallel.h"
 #include "core/indicial_table.h"
 #include "core/rigid_load.h"
@@ -135,13 +136,8 @@ MatrixXd interpolated(const MatrixXd& value, const std::vector<Index>& at, Index
   return all;
 }
 
-/// Force per reading for a load that is spread evenly over the strips.
-double steady_per_reading(const Rig& rig) {  // `check` has seen to the arms
-  const double gauge = rig.station[rig.gauge_element - 1], lever = rig.station[rig.calibration_element - 1] - gauge;
-  double arms = 0;
-  for (const int element : rig.submerged) arms += std::max(0.0, rig.station[element - 1] - gauge) / lever;
-  return static_cast<double>(rig.submerged.size()) / arms;
-}
+/// Load per reading where it is spread evenly over the strips: `check` has seen to it that the gauge feels them.
+double steady_per_reading(const Rig& rig) { return 1 / gauge_reading_of_unit_load(rig); }
 
 /// Loads of the rigid rig at theta and c of a leg that goes on `from` the one before, and how they move at `at`.
 RigidLoad load_at(const RunResidual& residual, const VectorXd& theta, const VectorXd& c, const std::vector<Index>& at, const RigidLoad::State& from) {

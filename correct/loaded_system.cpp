@@ -31,22 +31,15 @@ LinearSystem loaded_system(const AeroelasticModel& model, const Conditions& cond
     all.rightCols(lags) = rows.leftCols(lags);
     return all;
   };
+  DualMatrix loads(place(rigid.C.value.topRows(2)), theta.size());
+  for (Index j = 0; j < theta.size(); ++j)
+    if (rigid.C.depends_on(j)) loads.add_partial(j, place(rigid.C.d(j).topRows(2)));
   system.A = system.A.grown(states + lags, states + lags);
   system.A.value.bottomRows(lags) = place(rigid.A.value.topRows(lags));
   system.B = system.B.grown(states + lags, inputs);
   system.C = system.C.grown(own + 2, states + lags);
-  system.C.value.bottomRows(2) = place(rigid.C.value.topRows(2));
+  system.C.set_block(own, 0, loads);
   system.D = system.D.grown(own + 2, inputs);
-  // The loads are linear in each parameter by itself, so that a difference is the slope.
-  for (Index j = 0; j < theta.size(); ++j) {
-    VectorXd moved = theta;
-    moved[j] += 1;
-    const MatrixXd slope = rigid_system(model, conditions, moved).C.value.topRows(2) - rigid.C.value.topRows(2);
-    if (slope.isZero(0)) continue;
-    MatrixXd rows = MatrixXd::Zero(own + 2, states + lags);
-    rows.bottomRows(2) = place(slope);
-    system.C.add_partial(j, rows);
-  }
   system.outputs.insert(system.outputs.end(), {"circulatory", "normal_force"});
   return system;
 }

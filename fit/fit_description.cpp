@@ -9,7 +9,7 @@
 
 #include "core/error.h"
 #include "core/fingerprint.h"
-#include "core/simulate.h"
+#include "core/gauge_lever.h"
 #include "fit/coloured_noise.h"
 #include "fit/share_followed.h"
 

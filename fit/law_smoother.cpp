@@ -76,8 +76,9 @@ void LawSmoother::prepare(const VectorXd& theta) {
     disturb_.resize(states_, disturbances_);
     disturb_ << gamma0_ + gamma1_, exact_.dt * MatrixXd::Identity(states_, states_).middleCols(system_.coordinates, system_.coordinates);
   }
-  sees_.resize(laws_, states_);
-  for (Index i = 0; i < laws_; ++i) sees_.row(i) = system_.feedback[static_cast<std::size_t>(i)].sees;
+  arguments_ = Arguments(system_);
+  before_ = gamma0_(Eigen::all, arguments_.owner);
+  behind_ = gamma1_(Eigen::all, arguments_.owner);
 }
 
 VectorXd LawSmoother::enough_to_move(const VectorXd& theta) {
@@ -91,19 +92,22 @@ VectorXd LawSmoother::enough_to_move(const VectorXd& theta) {
 
 /// Forces of the laws along the trajectory, and their derivatives.
 void LawSmoother::look_at_laws(const VectorXd& theta) {
-  force_ = slope_ = MatrixXd::Zero(laws_, samples_);
+  force_ = MatrixXd::Zero(laws_, samples_);
+  slope_ = MatrixXd::Zero(arguments_.count(), samples_);
   law_partial_ = MatrixXd::Zero(laws_, changes_ * samples_);
   if (!followed_) {
     state_ = MatrixXd::Zero(states_, samples_);
     offset_ = VectorXd::Zero(channels_);
     return;
   }
+  const MatrixXd seen = arguments_.sees * state_;
   for (Index k = 0; k < samples_; ++k)
     for (Index i = 0; i < laws_; ++i) {
       const Feedback& f = system_.feedback[static_cast<std::size_t>(i)];
-      const FeedbackForce at_z = force_of(f, sees_.row(i).dot(state_.col(k)), theta);
+      const Index first = arguments_.first[static_cast<std::size_t>(i)];
+      const FeedbackForce at_z = force_of(f, seen.col(k).data() + first, theta);
       force_(i, k) = at_z.value;
-      slope_(i, k) = at_z.slope;
+      for (Index a = 0; a < f.sees.rows(); ++a) slope_(first + a, k) = at_z.slope[static_cast<std::size_t>(a)];
       for (Index a = 0; a < changes_; ++a)
         if (const Index own = parameters_[static_cast<std::size_t>(a)] - f.first_parameter; own >= 0 && own < f.parameters) law_partial_(i, k * changes_ + a) = at_z.partial[static_cast<std::size_t>(own)];
     }
@@ -141,16 +145,17 @@ MatrixXd LawSmoother::moved_by_theta() const {
 void LawSmoother::write_step(Index k, const Eigen::Ref<const MatrixXd>& moved) {
   const Index given = system_.B.cols() - laws_;
   const auto now = slope_.col(k), then = slope_.col(k + 1);
+  const MatrixXd& sees = arguments_.sees;
   MatrixXd& step = ahead_[static_cast<std::size_t>(k)];
   step.resize(states_, states_ + disturbances_ + changes_ + 1);
-  step.leftCols(states_) = exact_.transition.value + gamma0_ * now.asDiagonal() * sees_;
+  step.leftCols(states_) = exact_.transition.value + before_ * now.asDiagonal() * sees;
   step.middleCols(states_, disturbances_) = disturb_;
   step.middleCols(states_ + disturbances_, changes_) = moved + gamma0_ * law_partials(k) + gamma1_ * law_partials(k + 1);
-  step.rightCols(1) = gamma0_ * (force_.col(k) - now.cwiseProduct(sees_ * state_.col(k))) + gamma1_ * (force_.col(k + 1) - then.cwiseProduct(sees_ * state_.col(k + 1)));
+  step.rightCols(1) = gamma0_ * force_.col(k) - before_ * now.cwiseProduct(sees * state_.col(k)) + gamma1_ * force_.col(k + 1) - behind_ * then.cwiseProduct(sees * state_.col(k + 1));
   if (given > 0) step.rightCols(1) += exact_.input0.value.leftCols(given) * inputs_.row(k).transpose() + exact_.input1.value.leftCols(given) * inputs_.row(k + 1).transpose();
   if (followed_ && laws_ > 0) {  // (1 - gamma1 slope sees)^-1, of low rank
-    const MatrixXd pushed = gamma1_ * then.asDiagonal();
-    step += pushed * (MatrixXd::Identity(laws_, laws_) - sees_ * pushed).partialPivLu().solve(sees_ * step);
+    const MatrixXd pushed = behind_ * then.asDiagonal();
+    step += pushed * (MatrixXd::Identity(pushed.cols(), pushed.cols()) - sees * pushed).partialPivLu().solve(sees * step);
   }
 }
 
@@ -159,7 +164,8 @@ void LawSmoother::write_reading(Index k, Index channel, Eigen::Ref<RowVectorXd> 
   const double w = weight_(k, channel);
   const Index given = system_.B.cols() - laws_;
   const auto direct = system_.D.value.row(channel).tail(laws_);
-  row.head(states_) = w * (system_.C.value.row(channel) + direct * slope_.col(k).asDiagonal() * sees_);
+  const RowVectorXd by_argument = direct(arguments_.owner).cwiseProduct(slope_.col(k).transpose());
+  row.head(states_) = w * (system_.C.value.row(channel) + by_argument * arguments_.sees);
   for (Index a = 0; a < changes_; ++a) {
     const Index j = parameters_[static_cast<std::size_t>(a)];
     double change = direct.dot(law_partials(k).col(a));
@@ -168,7 +174,7 @@ void LawSmoother::write_reading(Index k, Index channel, Eigen::Ref<RowVectorXd> 
     row[states_ + a] = w * change;
   }
   row[states_ + changes_ + channel] = w;
-  double known = direct.dot(force_.col(k) - slope_.col(k).cwiseProduct(sees_ * state_.col(k)));
+  double known = direct.dot(force_.col(k)) - by_argument.dot(arguments_.sees * state_.col(k));
   if (given > 0) known += system_.D.value.row(channel).head(given).dot(inputs_.row(k));
   row[row.size() - 1] = w * (measured_(k, channel) - known);
 }

@@ -4,6 +4,7 @@
 
 #include "core/aeroelastic_model.h"
 #include "core/exact_step.h"
+#include "core/feedback_force.h"
 #include "fit/run_residual.h"
 
 namespace unrig {
@@ -63,11 +64,13 @@ class LawSmoother {
   LinearSystem system_;
   ExactStep exact_;
   Eigen::Index readings_ = 0, parts_ = 1, samples_ = 0, channels_ = 0, changes_ = 0, states_ = 0, laws_ = 0, disturbances_ = 0;
-  Eigen::MatrixXd gamma0_, gamma1_, disturb_, sees_;
+  Eigen::MatrixXd gamma0_, gamma1_, disturb_;
+  Eigen::MatrixXd before_, behind_;  ///< gamma0_ and gamma1_ with a column per argument
+  Arguments arguments_;
 
   bool followed_ = false;
   Eigen::MatrixXd state_, disturbance_;         ///< n x samples, disturbances x (samples - 1)
-  Eigen::MatrixXd force_, slope_, law_partial_; ///< of the laws along it
+  Eigen::MatrixXd force_, slope_, law_partial_; ///< of the laws along it; slopes by argument
   Eigen::VectorXd offset_;
 
   // Of the last linearisation: x_{k+1} over [x_k | w_k | change of theta | 1]; w_k over [w_k | x_k | change | offsets | right]; the start over [free

@@ -52,7 +52,7 @@ void append_strip_signal(LinearSystem& system, const EffectContext& c, const Dua
 }
 
 void append_feedback(LinearSystem& system, const DualMatrix& direction, Feedback feedback) {
-  if (feedback.parameters > most_law_parameters) throw std::logic_error("a law with more parameters than core/feedback_force.h has room for");
+  if (feedback.parameters > most_law_parameters || feedback.sees.rows() > most_law_arguments) throw std::logic_error("a law with more parameters or arguments than core/feedback_force.h has room for");
   for (DualMatrix* m : {&system.B, &system.D}) {
     const DualMatrix push = *m * direction;
     const Index columns = m->cols();
@@ -60,6 +60,24 @@ void append_feedback(LinearSystem& system, const DualMatrix& direction, Feedback
     m->set_block(0, columns, push);
   }
   system.feedback.push_back(std::move(feedback));
+}
+
+Index append_memory(LinearSystem& system, const DualMatrix& direction, const DualMatrix& force, Feedback rate) {
+  const Index memory = system.states(), inputs = system.B.cols();
+  const DualMatrix push = system.B * direction * force, direct = system.D * direction * force;
+  system.A = system.A.grown(memory + 1, memory + 1);
+  system.A.set_block(0, memory, push);
+  system.C = system.C.grown(system.C.rows(), memory + 1);
+  system.C.set_block(0, memory, direct);
+  system.B = system.B.grown(memory + 1, inputs + 1);
+  system.B.value(memory, inputs) = 1;
+  system.D = system.D.grown(system.D.rows(), inputs + 1);
+  rate.sees.conservativeResizeLike(MatrixXd::Zero(rate.sees.rows(), memory + 1));
+  rate.sees.conservativeResizeLike(MatrixXd::Zero(rate.sees.rows() + 1, memory + 1));
+  rate.sees(rate.sees.rows() - 1, memory) = 1;
+  if (rate.parameters > most_law_parameters || rate.sees.rows() > most_law_arguments) throw std::logic_error("a law with more parameters or arguments than core/feedback_force.h has room for");
+  system.feedback.push_back(std::move(rate));
+  return memory;
 }
 
 Eigen::RowVectorXd first_mode(const AeroelasticModel& model, Index coordinates) {

@@ -35,7 +35,7 @@ Effect coulomb_friction() {
   e.acts = [](const Conditions&) { return true; };
   e.apply = [](LinearSystem& system, const EffectContext& c) {
     const Eigen::RowVectorXd shape = first_mode(c.model, system.coordinates);
-    append_feedback(system, port(system, c.ports.coordinate, shape[0]), {rate_of(system, shape), c.first_parameter, 2, friction});
+    append_feedback(system, port(system, c.ports.coordinate, shape[0]), {rate_of(system, shape), c.first_parameter, 2, of_one<friction>});
   };
   return e;
 }

@@ -18,7 +18,7 @@ Effect cubic_stiffness() {
   e.acts = [](const Conditions&) { return true; };
   e.apply = [](LinearSystem& system, const EffectContext& c) {
     const Eigen::RowVectorXd shape = first_mode(c.model, system.coordinates);
-    append_feedback(system, port(system, c.ports.coordinate, shape[0]), {displacement_of(system, shape), c.first_parameter, 2, cubic_law});
+    append_feedback(system, port(system, c.ports.coordinate, shape[0]), {displacement_of(system, shape), c.first_parameter, 2, of_one<cubic_law>});
   };
   return e;
 }

@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "core/aeroelastic_model.h"
+#include "core/feedback_force.h"
 
 namespace unrig {
 
@@ -70,6 +71,10 @@ void append_strip_signal(LinearSystem& system, const EffectContext& context, con
 
 /// A nonlinear force: f(z) times `direction` (ports x 1, over all input columns of `system`, with partials), z = sees x.
 void append_feedback(LinearSystem& system, const DualMatrix& direction, Feedback feedback);
+
+/// A force with memory: `force` times z (1 x 1, with partials) along `direction`, z' = `rate`, z = 0 where the run begins. The arguments of `rate` are what it sees,
+/// and z behind them. Returns the index of z among the states.
+Eigen::Index append_memory(LinearSystem& system, const DualMatrix& direction, const DualMatrix& force, Feedback rate);
 
 /// `amount` on input column `column`, as a direction for append_feedback.
 DualMatrix port(const LinearSystem& system, Eigen::Index column, double amount);

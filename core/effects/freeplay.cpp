@@ -58,7 +58,7 @@ Effect freeplay() {
     direction.add_partial(stiffness, port(system, c.ports.coordinate + first, omega * omega / shape).value);
     Eigen::RowVectorXd twist = Eigen::RowVectorXd::Zero(system.coordinates);
     twist[first] = shape;
-    append_feedback(system, direction, {displacement_of(system, twist), c.first_parameter, 1, gap, rounded_gap, steps});
+    append_feedback(system, direction, {displacement_of(system, twist), c.first_parameter, 1, of_one<gap>, of_one<rounded_gap>, steps});
   };
   return e;
 }

@@ -21,5 +21,6 @@ Effect mains_hum();
 Effect channel_delay();
 Effect twist_stiffness();
 Effect elastic_coupling();
+Effect bouc_wen();
 
 }  // namespace unrig

@@ -31,13 +31,13 @@ Effect quadratic_drag() {
     const Rig& rig = c.model.rig();
     const Eigen::Index n = system.coordinates;
     if (rig.is_modal()) {
-      for (Eigen::Index i = 0; i < n; ++i) append_feedback(system, port(system, c.ports.coordinate + i, 1), {rate_of(system, Eigen::RowVectorXd::Unit(n, i)), c.first_parameter, 1, drag});
+      for (Eigen::Index i = 0; i < n; ++i) append_feedback(system, port(system, c.ports.coordinate + i, 1), {rate_of(system, Eigen::RowVectorXd::Unit(n, i)), c.first_parameter, 1, of_one<drag>});
       return;
     }
     const double per_strip = 0.5 * c.conditions.density * 2 * rig.semichord() * rig.strip_length;
     for (Eigen::Index s = 0; s < c.ports.strips; ++s) {
       const Eigen::RowVectorXd shape = c.model.basis().normal.row(rig.submerged[static_cast<std::size_t>(s)] - 1);
-      append_feedback(system, port(system, c.ports.strip + s, per_strip), {rate_of(system, shape), c.first_parameter, 1, drag});
+      append_feedback(system, port(system, c.ports.strip + s, per_strip), {rate_of(system, shape), c.first_parameter, 1, of_one<drag>});
     }
   };
   return e;

@@ -24,6 +24,7 @@ const std::vector<Effect>& effects() {
       channel_delay(),
       twist_stiffness(),
       elastic_coupling(),
+      bouc_wen(),
   };
   return table;
 }

@@ -29,7 +29,7 @@ Effect twist_stiffness() {
     if (basis.torsion_modes < 1) return;
     const Eigen::Index first = basis.normal_modes;
     const double shape = basis.twist(c.model.rig().submerged.back() - 1, first);
-    append_feedback(system, port(system, c.ports.coordinate + first, shape), {displacement_of(system, shape * Eigen::RowVectorXd::Unit(system.coordinates, first)), c.first_parameter, 2, cubic_law});
+    append_feedback(system, port(system, c.ports.coordinate + first, shape), {displacement_of(system, shape * Eigen::RowVectorXd::Unit(system.coordinates, first)), c.first_parameter, 2, of_one<cubic_law>});
   };
   return e;
 }

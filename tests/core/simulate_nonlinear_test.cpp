@@ -108,6 +108,66 @@ TEST(SimulateNonlinear, CubicStiffnessHasDuffingsPeriod) {
   }
 }
 
+/// k x of m x'' + c x' + k x = -F z, z' = v/x_y (1 - |z|^n (b + (1 - b) sign(v z))), as runge_kutta.
+VectorXd runge_kutta_of_hysteresis(double damping_ratio, double load, double dt, double seconds, double F, double yield, double b, double n) {
+  constexpr int finer = 40;
+  const double h = dt / finer, c = 2 * damping_ratio * mass * omega;
+  using State = Eigen::Vector3d;
+  const auto slope = [&](const State& s) {
+    const double side = s[1] * s[2] > 0 ? 1 : s[1] * s[2] < 0 ? -1 : 0;
+    return State(s[1], (-F * s[2] - c * s[1] - stiffness * s[0]) / mass, s[1] / yield * (1 - std::pow(std::abs(s[2]), n) * (b + (1 - b) * side)));
+  };
+  State s(load / stiffness, 0, 0);
+  VectorXd reading(static_cast<Index>(std::lround(seconds / dt)) + 1);
+  for (double& y : reading) {
+    y = stiffness * s[0];
+    for (int i = 0; i < finer; ++i) {
+      const State a = slope(s), d = slope(s + h / 2 * a), e = slope(s + h / 2 * d), f = slope(s + h * e);
+      s += h / 6 * (a + 2 * d + 2 * e + f);
+    }
+  }
+  return reading;
+}
+
+TEST(SimulateNonlinear, HysteresisMeetsRungeKutta) {
+  constexpr double zeta = 0.005, load = 100, seconds = 4, F = 12, yield = 0.15 * load / stiffness, b = 0.3, n = 1.5;
+  const auto miss = [&](double dt) {
+    return (decay(zeta, load, dt, seconds, "bouc-wen", {F, yield, b, n}) - runge_kutta_of_hysteresis(zeta, load, dt, seconds, F, yield, b, n)).cwiseAbs().maxCoeff();
+  };
+  const double coarse = miss(4e-3), fine = miss(2e-3);
+  // The rate of the memory runs straight between samples. Where the rig turns it has a kink, which a sample misses by the square of its length too.
+  EXPECT_LT(coarse, 0.02 * F);
+  EXPECT_GT(coarse / fine, 3) << "second order";
+  EXPECT_GT(coarse, 0) << "two integrators, not one";
+}
+
+TEST(SimulateNonlinear, HysteresisTakesWhatItsLoopEncloses) {
+  // With b = 1/2 and n = 1 the force goes from -F to F over 5/2 x_y less work than if it did so at once: 1 - z is 1 to 2 over the first x_y (3/2 in all), then exp(-x/x_y) (1).
+  // Between turns x0 and x1 that leaves k/2 (x0^2 - x1^2) = F (x0 + x1 - d), d = 5/2 x_y, after the release, where z begins at 0, x_y.
+  constexpr double load = 100, F = 3, dt = 1e-3, yield = 0.02 * load / stiffness;
+  const VectorXd reading = decay(0, load, dt, 3.2 / frequency, "bouc-wen", {F, yield, 0.5, 1});
+  std::vector<double> turns{load};
+  for (Index k = 1; k + 1 < reading.size(); ++k)
+    if ((reading[k] - reading[k - 1]) * (reading[k + 1] - reading[k]) < 0) {  // the parabola through three samples
+      const double slope = (reading[k + 1] - reading[k - 1]) / 2, bend = reading[k + 1] - 2 * reading[k] + reading[k - 1];
+      turns.push_back(std::abs(reading[k] - slope * slope / (2 * bend)));
+    }
+  ASSERT_GE(turns.size(), 6u);
+  for (std::size_t i = 0; i + 1 < 6; ++i) {
+    const double missing = (i == 0 ? 1 : 2.5) * stiffness * yield, lost = 2 * F * (1 - missing / (turns[i] + turns[i + 1]));
+    EXPECT_NEAR(turns[i] - turns[i + 1], lost, 0.005 * 2 * F) << i;  // a fifth of what the loop's corners take from that of dry friction
+  }
+}
+
+TEST(SimulateNonlinear, HysteresisWithoutALoopIsASpring) {
+  // With b = 1 and n = 1 the force is F (1 - exp(-|x - x_0|/x_y)) whichever way the rig goes: every turn is as far out as the one before it on that side.
+  constexpr double load = 100, F = 10, dt = 1e-3, yield = 0.5 * load / stiffness;
+  const VectorXd reading = decay(0, load, dt, 4, "bouc-wen", {F, yield, 1, 1});
+  EXPECT_NEAR(reading.tail(500).maxCoeff(), load, 1e-3 * load);
+  const VectorXd linear = decay(0, load, dt, 4, "", {});
+  EXPECT_GT((reading - linear).cwiseAbs().maxCoeff(), 0.1 * load) << "it is at work";
+}
+
 class SimulateNonlinearStep : public testing::Test {
  protected:
   static SimulateProblem problem(const std::string& effect) {

@@ -1,3 +1,4 @@
+#include "core/gauge_lever.h"
 #include "core/simulate.h"
 
 #include <gmock/gmock.h>
