@@ -1,0 +1,99 @@
+// Hysteresis as an effect by name, fitted: to recordings by an integrator that shares no code with the fit.
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <numbers>
+#include <random>
+
+#include "fit/fit.h"
+
+namespace unrig {
+namespace {
+
+using Eigen::Index;
+using Eigen::VectorXd;
+using std::numbers::pi;
+
+struct Truth {
+  double mass = 2, hertz = 5, damping_ratio = 0.01, force = 12, yield = 2e-3, shape = 0.4, sharpness = 1;
+  double stiffness() const { return mass * std::pow(2 * pi * hertz, 2); }
+  double damping() const { return 2 * damping_ratio * mass * 2 * pi * hertz; }
+};
+
+/// Displacement [m] under a force that runs straight between samples: m x'' + c x' + k x + F z = u, by the classical Runge-Kutta method with ten steps a sample.
+VectorXd driven(const Truth& t, const VectorXd& input, double dt) {
+  constexpr int finer = 10;
+  const double h = dt / finer;
+  using State = Eigen::Vector3d;
+  const auto slope = [&](const State& s, double u) {
+    const double side = s[1] * s[2] > 0 ? 1 : s[1] * s[2] < 0 ? -1 : 0;
+    return State(s[1], (u - t.force * s[2] - t.damping() * s[1] - t.stiffness() * s[0]) / t.mass, s[1] / t.yield * (1 - std::pow(std::abs(s[2]), t.sharpness) * (t.shape + (1 - t.shape) * side)));
+  };
+  State s = State::Zero();
+  VectorXd reading(input.size());
+  for (Index k = 0; k < input.size(); ++k) {
+    reading[k] = s[0];
+    const double next = k + 1 < input.size() ? input[k + 1] : input[k];
+    for (int i = 0; i < finer; ++i) {
+      const auto u = [&](double part) { return input[k] + (next - input[k]) * (i + part) / finer; };
+      const State a = slope(s, u(0)), b = slope(s + h / 2 * a, u(0.5)), c = slope(s + h / 2 * b, u(0.5)), d = slope(s + h * c, u(1));
+      s += h / 6 * (a + 2 * b + 2 * c + d);
+    }
+  }
+  return reading;
+}
+
+const FittedParameter& parameter(const FitResult& result, const std::string& name) {
+  for (const FittedParameter& p : result.parameters)
+    if (p.name == name) return p;
+  ADD_FAILURE() << "no parameter " << name;
+  return result.parameters.front();
+}
+
+TEST(Hysteresis, IsFittedByName) {
+  const Truth truth;
+  constexpr double dt = 2e-3, noise = 2e-5;
+  constexpr Index samples = 6000;
+  std::mt19937_64 random(7);
+  std::uniform_real_distribution<double> phase(0, 2 * pi);
+  VectorXd force = VectorXd::Zero(samples);
+  for (int line = 1; line <= 60; ++line) {  // 0.2 to 12 Hz
+    const double at = phase(random);
+    for (Index k = 0; k < samples; ++k) force[k] += 3 * std::sin(2 * pi * 0.2 * line * dt * static_cast<double>(k) + at);
+  }
+  VectorXd reading = driven(truth, force, dt);
+  std::normal_distribution<double> white(0, noise);
+  for (double& x : reading) x += white(random);
+
+  FitProblem problem;
+  problem.rig.file = "rig.toml";
+  problem.rig.modal = {{truth.mass, 1.05 * truth.hertz, 0.02, 1, "m"}};
+  unrig::Run run;
+  run.file = "forced.csv";
+  run.kind = RunKind::forced;
+  run.dt = dt;
+  run.channels = {{"force", "N", "N", 1, force, 0}, {"gauge", "m", "m", 1, reading, 0}};
+  problem.runs = {run};
+  const FitResult without = fit(problem);
+  EXPECT_GT(without.runs[0].channels[0].rms_residual, 10 * noise) << "a linear rig does not explain it";
+  problem.effects = {"bouc-wen"};
+  const FitResult result = fit(problem);
+  EXPECT_TRUE(result.converged) << result.message;
+  // The force on the memory runs straight between samples, which leaves something of the noise's size at the kinks.
+  EXPECT_LT(result.runs[0].channels[0].rms_residual, 1.1 * noise);
+  const auto near = [&](const std::string& name, double value) {
+    const FittedParameter& p = parameter(result, name);
+    EXPECT_NEAR(p.value, value, std::max(4 * p.std_error, 0.01 * value)) << name;  // the steps' own error is below a per cent
+    EXPECT_LT(p.std_error, 0.1 * value) << name;
+  };
+  near("modal[1].mass", truth.mass);
+  near("modal[1].stiffness", truth.stiffness());
+  near("bouc-wen.force", truth.force);
+  near("bouc-wen.yield_displacement", truth.yield);
+  near("bouc-wen.shape", truth.shape);
+  near("bouc-wen.sharpness", truth.sharpness);
+}
+
+}  // namespace
+}  // namespace unrig
