@@ -7,7 +7,7 @@
 #include <cmath>
 #include <cstdlib>
 #include <filesystem>
-#include <fstream>
+#include <iterator>
 #include <regex>
 #include <sstream>
 #include <string>
