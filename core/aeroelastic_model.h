@@ -1,6 +1,7 @@
 #pragma once
 #include <Eigen/Core>
 #include <complex>
+#include <functional>
 #include <string>
 #include <vector>
 
@@ -12,6 +13,9 @@
 
 namespace unrig {
 
+/// What a parameter is to the model.
+enum class Role { effect, stiffness, damping, mass, slope, load, amplitude };
+
 /// One adjustable quantity of the model. `per_run` parameters have their own value in every run.
 struct Parameter {
   std::string name;
@@ -20,6 +24,9 @@ struct Parameter {
   double lower = 0;
   double upper = 0;
   bool per_run = false;
+  std::string advice = {};  ///< what to record where the data do not determine it; empty: said by the role
+  Role role = Role::effect;
+  int mode = -1;            ///< of a rig known as modes: whose it is, from 0
 };
 
 /// What of a run's conditions enters the model.
@@ -41,7 +48,7 @@ struct Feedback {
   Eigen::Index first_parameter = 0; ///< of the law, in theta
   Eigen::Index parameters = 0;
   /// f(z) for the parameters p; writes its derivatives in each of z and in each of p.
-  using Law = double (*)(const double* z, const double* p, double* slope, double* partial);
+  using Law = std::function<double(const double* z, const double* p, double* slope, double* partial)>;
   Law law = nullptr;
   /// For searches, the same with its corners rounded; none where it has no corners.
   Law rounded = nullptr;

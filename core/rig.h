@@ -1,5 +1,6 @@
 #pragma once
 #include <Eigen/Core>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -8,6 +9,9 @@
 #include "core/gauge_filter.h"
 
 namespace unrig {
+
+struct Effect;
+struct Givens;
 
 /// A chain of lumped elements, clamped at its first end (seed, section 3.1): normal displacement or twist.
 struct Chain {
@@ -34,6 +38,7 @@ struct ModalMode {
   double damping_ratio = 0;
   double gauge_gain = 1;   ///< gauge reading per metre of modal displacement, SI
   std::string gauge_unit;  ///< SI unit of the reading ("N", "rad", "N.m")
+  std::vector<double> sensor_shape = {};  ///< displacement or twist at each of the rig's sensors, per unit of the modal displacement
 };
 
 /// A structure, in SI (correct/manual/rig_files.md). Either `modal` is filled, or the two chains and what belongs to them.
@@ -58,6 +63,8 @@ struct Rig {
 
   std::vector<Sensor> sensors;
   std::vector<ModalMode> modal;
+  std::vector<std::shared_ptr<const Effect>> laws;  ///< that a user wrote down; effects of this rig beside those of the table
+  std::shared_ptr<const Givens> givens;             ///< stated uncertainties of the numbers above; none: all are exact
   std::vector<std::string> warnings;
 
   bool is_modal() const { return !modal.empty(); }

@@ -1,6 +1,7 @@
 #pragma once
 #include <Eigen/Core>
 #include <cstddef>
+#include <memory>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -8,6 +9,8 @@
 #include "core/error.h"
 
 namespace unrig {
+
+struct Givens;
 
 /// How a recording was made (correct/manual/run_files.md): prescribed pitch, free decay, measured force, moved mount.
 enum class RunKind { step, pluck, forced, moved };
@@ -24,6 +27,8 @@ struct Channel {
   double factor = 1;      ///< SI per file unit (calibration included)
   Eigen::VectorXd value;
   std::size_t missing = 0;  ///< samples without a number in the file
+  std::size_t clipped = 0;  ///< readings at the end of the converter's range, left out
+  std::size_t bad = 0;      ///< isolated readings far from their neighbours, left out
 };
 
 /// One recording: the file's meta data and its columns on a uniform grid t_k = start + k dt.
@@ -43,6 +48,7 @@ struct Run {
   bool resampled = false;     ///< true where the file's times jitter and the channels were interpolated to the uniform grid
   double largest_jitter = 0;  ///< s
   std::vector<Channel> channels;
+  std::shared_ptr<const Givens> givens;  ///< stated uncertainties of the header's numbers; none: all are exact
   std::vector<std::string> warnings;
 
   Eigen::Index samples() const { return channels.empty() ? 0 : channels.front().value.size(); }

@@ -47,6 +47,8 @@ struct FittedChannel {
   Eigen::Index spikes = 0;   ///< left out as electrical spikes
   double rms_residual = 0;
   double noise = 0;          ///< standard deviation of the channel's white part, estimated from its differences
+  std::size_t clipped = 0;   ///< left out as readings at the end of the converter's range
+  std::size_t bad = 0;       ///< left out as isolated bad readings
 };
 
 struct FittedRun {
@@ -63,6 +65,15 @@ struct FittedRun {
   double reduced_chi2() const { return chi2 / static_cast<double>(degrees_of_freedom); }
   /// Whether chi-square is what noise would leave: it scatters by sqrt(2/n), the noise level that it counts in, and its square, by a few per cent.
   bool explained() const;
+};
+
+/// A number of the rig file or of a run's header that states its uncertainty, and what the recordings say of it.
+struct FittedGiven {
+  std::string name;  ///< "normal.mass[13]"
+  std::string unit;
+  std::string run;   ///< file of the run whose header has it; empty of the rig's
+  double stated = 0, stated_std = 0;
+  double value = 0, std_error = 0;
 };
 
 struct ProfiledParameter {
@@ -88,6 +99,10 @@ struct FitResult {
   std::vector<std::string> effects;
   Eigen::Index law_steps = 1;   ///< nonlinear laws were followed in so many times the steps that they ask for
   std::string rig_file;
+  std::string rig_fingerprint;  ///< of the rig's numbers (core/fingerprint.h)
+  std::string program, command; ///< version and command line that made this result; empty where it was not read from or for a file
+  std::vector<FittedGiven> givens;
+  Eigen::MatrixXd joint_covariance;  ///< of `parameters`, then `givens`; empty without givens
   Wagner circulation = Wagner::within_1e4;
   Eigen::Index normal_modes = 0, torsion_modes = 0;
   std::vector<std::string> warnings;
