@@ -21,10 +21,10 @@ using std::numbers::pi;
 
 constexpr double omega = 2 * pi * 5, dt = 0.01;  // twenty samples a period
 
-double sharp_gap(double z, const double* p, double& slope, double* partial) {
-  slope = std::abs(z) < p[0] ? 1 : 0;
-  partial[0] = std::abs(z) < p[0] ? 0 : (z > 0 ? 1 : -1);
-  return std::clamp(z, -p[0], p[0]);
+double sharp_gap(const double* z, const double* p, double* slope, double* partial) {
+  *slope = std::abs(*z) < p[0] ? 1 : 0;
+  *partial = std::abs(*z) < p[0] ? 0 : (*z > 0 ? 1 : -1);
+  return std::clamp(*z, -p[0], p[0]);
 }
 
 /// x and x' of x'' = -omega^2 (x - clamp(x, -delta, delta)), from x = 1 at rest.
@@ -115,21 +115,21 @@ TEST(NonlinearResponse, FreeplayIsAGapWhoseCornersASearchRounds) {
   const auto sharp_law = system.feedback.front().law;
   const double half = 2e-3, h = 1e-11;
   double slope = 0, ignored = 0, partial[1] = {}, none[1] = {};
-  const auto at = [&](double z, double gap) { return law(z, &gap, ignored, none); };
+  const auto at = [&](double z, double gap) { return law(&z, &gap, &ignored, none); };
   std::vector<double> arguments;
   for (double z = -3 * half; z <= 3 * half; z += 0.0317 * half) arguments.push_back(z);
   for (double z = 0.995 * half; z <= 1.005 * half; z += 0.00017 * half) arguments.push_back(z), arguments.push_back(-z);
   for (const double z : arguments) {
-    const double value = law(z, &half, slope, partial), sharp = std::clamp(z, -half, half);
+    const double value = law(&z, &half, &slope, partial), sharp = std::clamp(z, -half, half);
     const bool corner = std::abs(std::abs(z) - half) < 0.00301 * half;
     EXPECT_LE(std::abs(value - sharp), corner ? 0.000751 * half : 1e-18) << z << ": a corner of half width w is cut by w/4 at most";
-    EXPECT_EQ(sharp_law(z, &half, ignored, none), sharp) << z;
+    EXPECT_EQ(sharp_law(&z, &half, &ignored, none), sharp) << z;
     EXPECT_NEAR(slope, (at(z + h, half) - at(z - h, half)) / (2 * h), 1e-5) << z;
     EXPECT_NEAR(partial[0], (at(z, half + h) - at(z, half - h)) / (2 * h), 1e-5) << z;
     EXPECT_EQ(value, -at(-z, half)) << z;
   }
-  double zero = 0;
-  EXPECT_EQ(law(1e-3, &zero, slope, partial), 0) << "no gap takes nothing";
+  const double zero = 0, somewhere = 1e-3;
+  EXPECT_EQ(law(&somewhere, &zero, &slope, partial), 0) << "no gap takes nothing";
 }
 
 }  // namespace
