@@ -180,7 +180,8 @@ class Decays {
     for (const std::size_t i : free_) {
       const Unknown& u = joint.unknowns()[i];
       const Parameter& p = joint.parameter(u);
-      problem_.unknowns.push_back({joint.name(u), u.value, p.lower, p.upper, false, 0});
+      const auto [lower, upper] = bounds_at(joint.model(), u.parameter, u.value);
+      problem_.unknowns.push_back({joint.name(u), u.value, lower, upper, false, 0});
     }
     for (std::size_t d = 0; d < decays_.size(); ++d) add(decays_[d], linear[d]);
   }

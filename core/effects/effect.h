@@ -61,7 +61,7 @@ struct Effect {
   /// Of a nonlinear effect whose starts depend on the size of the response: from the largest argument that its law sees in the runs.
   std::function<std::vector<Eigen::VectorXd>(const AeroelasticModel&, double largest_argument)> starts_for;
   /// Of an effect that shows as a line in the spectrum: its frequency [Hz] in a run, for its parameters. A search then follows the lines of the residual's spectrum
-  /// through the bands of the first parameter, in place of `starts`. NaN: on this rig it has none.
+  /// through the bands of the first parameter, in place of `starts`. Only on rigs on which it has parameters.
   std::function<double(const AeroelasticModel&, const Conditions&, const Eigen::VectorXd& parameters)> frequency;
   /// Whether it can act at all in a run under these conditions.
   std::function<bool(const Rig&, const Conditions&)> acts;
@@ -78,6 +78,9 @@ struct Effect {
   bool in_the_load = false;     ///< it changes the load that a rigid rig would feel, which `correct` must not take out
   Needs needs = Needs::any_rig;
 };
+
+/// "carriage-vibration needs a run in a stream": why it acts in none of these runs of the rig; empty if it does in one.
+std::string why_idle(const Effect& effect, const Rig& rig, const std::vector<Conditions>& runs);
 
 /// Lowest and highest value of a parameter of `model`: its bounds, or those of the band of its effect that is nearest to `value`.
 Effect::Band bounds_at(const AeroelasticModel& model, Eigen::Index parameter, double value);
