@@ -9,6 +9,7 @@
 #include "core/effects/effect.h"
 #include "fit/arrival.h"
 #include "fit/decays_first.h"
+#include "fit/effect_option.h"
 #include "fit/effect_search.h"
 #include "fit/fit_description.h"
 #include "fit/gauss_newton.h"
@@ -76,15 +77,6 @@ void check_names(const AeroelasticModel& model, const FitProblem& problem) {
     if (name != "all" && !known(name)) throw InputError({"--profile", 0}, "no parameter '" + name + "' can be profiled", "wanted one of " + names, "Or there is no such file: run files may stand behind the option.");
 }
 
-/// What cannot act in any of the runs is no part of their model.
-void check_effects(const FitProblem& problem) {
-  std::vector<Conditions> conditions;
-  for (const Run& run : problem.runs) conditions.push_back(conditions_of(run));
-  for (const std::string& id : problem.effects)
-    if (const std::string why = why_idle(effect(id), problem.rig, conditions); !why.empty())
-      throw InputError({"--effect", 0}, id + " acts in none of these runs", "wanted runs and a rig in which it does: " + why, "Leave it out, or give such a run.");
-}
-
 }  // namespace
 
 double FitResult::bic() const { return chi2 + std::log(static_cast<double>(observations)) * static_cast<double>(variables); }
@@ -137,9 +129,9 @@ FitResult describe_fit(Arrival& arrival, const FitProblem& problem, Settle first
 
 FitResult fit(const FitProblem& problem) {
   const auto begin = std::chrono::steady_clock::now();
+  refuse_idle("--effect", problem.effects, problem.rig, problem.runs);
   const auto model = std::make_shared<const AeroelasticModel>(model_of(problem.rig, problem.runs, problem.circulation, problem.effects));
   check_names(*model, problem);
-  check_effects(problem);
   Arrival arrival = problem.effects.empty() ? arrive(problem, model) : arrive_at_effects(problem);
   check_lengths(arrival.joint);
   FitResult result = describe_fit(arrival, problem, Settle::steps);
