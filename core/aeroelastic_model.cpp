@@ -153,6 +153,15 @@ void keep_inputs(LinearSystem& system, const Conditions& conditions) {
   for (Feedback& f : system.feedback) f.sees.conservativeResizeLike(MatrixXd::Zero(f.sees.rows(), system.states()));  // states that came later
 }
 
+/// Lets an effect change the system, by no more states than it said before it saw theta: searches carry states from one theta to the next.
+void apply(const Effect& e, LinearSystem& system, const EffectContext& context) {
+  const Index before = system.states(), promised = e.states ? e.states(context.model, context.conditions) : 0;
+  e.apply(system, context);
+  const Index added = system.states() - before;
+  if (context.gauge < 0 ? added > promised : added != promised)  // what only the gauge reads is left out beside others
+    throw std::logic_error(fmt::format("the effect {} adds {} states where it promised {}", e.id, added, promised));
+}
+
 }  // namespace
 
 UndampedSystem undamped_system(const Rig& rig, const Basis& basis, double density) {
@@ -175,21 +184,26 @@ AeroelasticModel::AeroelasticModel(Rig rig, Basis basis, IndicialFunction circul
     : rig_(std::move(rig)), basis_(std::move(basis)), circulation_(std::move(circulation)), build_up_(build_up) {
   // Bounds are what a rig can be, wide: they keep a search physical, they are not prior knowledge.
   if (!rig_.is_modal()) {
-    parameters_ = {{"normal.stiffness_scale", "1", 1, 1e-3, 1e3, false},       {"torsion.stiffness_scale", "1", 1, 1e-3, 1e3, false},
-                   {"normal.damping_ratio", "1", 0.01, 0, 0.9, false},         {"torsion.damping_ratio", "1", 0.02, 0, 0.9, false},
-                   {"apparent_mass_coefficient", "1", 1, 0, 10, false},        {"normal_force_slope", "1/rad", 2 * pi, -20, 50, true}};
+    const std::string twist = "Record a run that excites torsion: a rapid step, or a pluck off the pitch axis.";
+    parameters_ = {{"normal.stiffness_scale", "1", 1, 1e-3, 1e3, false, {}, Role::stiffness},
+                   {"torsion.stiffness_scale", "1", 1, 1e-3, 1e3, false, twist, Role::stiffness},
+                   {"normal.damping_ratio", "1", 0.01, 0, 0.9, false, {}, Role::damping},
+                   {"torsion.damping_ratio", "1", 0.02, 0, 0.9, false, twist, Role::damping},
+                   {"apparent_mass_coefficient", "1", 1, 0, 10, false, "Record a free decay in the fluid besides one in air.", Role::mass},
+                   {"normal_force_slope", "1/rad", 2 * pi, -20, 50, true, "Record a step of the angle at this speed.", Role::slope}};
     for (Index k = 0; build_up_ == Circulation::free && k < circulation_.amplitude.size(); ++k)
-      parameters_.push_back({fmt::format("circulation.amplitude[{}]", k + 1), "1", circulation_.amplitude[k], -10, 10, true});
+      parameters_.push_back({fmt::format("circulation.amplitude[{}]", k + 1), "1", circulation_.amplitude[k], -10, 10, true, "Record a fast step of the angle and the run behind it.", Role::amplitude});
     return;
   }
   for (std::size_t i = 0; i < rig_.modal.size(); ++i) {
     const ModalMode& mode = rig_.modal[i];
     const double omega = 2 * pi * mode.frequency;
     const std::string prefix = fmt::format("modal[{}].", i + 1);
-    parameters_.push_back({prefix + "mass", "kg", mode.mass, 1e-6 * mode.mass, 1e6 * mode.mass, false});
-    parameters_.push_back({prefix + "stiffness", "N/m", mode.mass * omega * omega, 0, 1e6 * mode.mass * omega * omega, false});
-    parameters_.push_back({prefix + "damping", "N.s/m", 2 * mode.damping_ratio * mode.mass * omega, 0, 1e3 * mode.mass * omega, false});
-    parameters_.push_back({prefix + "mount_participation", "kg", mode.mass, -1e12 * mode.mass, 1e12 * mode.mass, false});
+    const int which = static_cast<int>(i);
+    parameters_.push_back({prefix + "mass", "kg", mode.mass, 1e-6 * mode.mass, 1e6 * mode.mass, false, {}, Role::mass, which});
+    parameters_.push_back({prefix + "stiffness", "N/m", mode.mass * omega * omega, 0, 1e6 * mode.mass * omega * omega, false, {}, Role::stiffness, which});
+    parameters_.push_back({prefix + "damping", "N.s/m", 2 * mode.damping_ratio * mode.mass * omega, 0, 1e3 * mode.mass * omega, false, {}, Role::damping, which});
+    parameters_.push_back({prefix + "mount_participation", "kg", mode.mass, -1e12 * mode.mass, 1e12 * mode.mass, false, "Record a run with the mount moving.", Role::load, which});
   }
 }
 
@@ -225,12 +239,12 @@ LinearSystem AeroelasticModel::system(const Conditions& conditions, const Vector
   LinearSystem system = rig_.is_modal() ? modal_system(with_ports, theta, channels) : beam_system(with_ports, theta, channels);
   const auto strips = static_cast<Index>(rig_.submerged.size());
   Index first = theta.size();
-  for (const std::string& id : effects_) first -= static_cast<Index>(effect(id).parameters.size());
+  for (const std::string& id : effects_) first -= static_cast<Index>(effect(id).parameters_on(rig_).size());
   for (const std::string& id : effects_) {
     const Effect& e = effect(id);
     const EffectContext context{*this, conditions, theta, first, gauge == channels.end() ? Index{-1} : gauge - channels.begin(), Ports{0, 1, 3, strips, 3 + strips, system.coordinates}};
-    if (e.acts(conditions)) e.apply(system, context);
-    first += static_cast<Index>(e.parameters.size());
+    if (e.acts(rig_, conditions)) apply(e, system, context);
+    first += static_cast<Index>(e.parameters_on(rig_).size());
   }
   system = amplify(std::move(system));
   keep_inputs(system, conditions);
@@ -243,7 +257,7 @@ AeroelasticModel AeroelasticModel::with_effects(const std::vector<std::string>& 
     const Needs needs = effect(id).needs;
     if (needs != Needs::any_rig && rig_.is_modal()) throw InputError({rig_.file, 0}, "a rig known only as modes", "wanted a beam rig, which the effect " + id + " needs", "Describe its section and chains, or leave the effect out.");
     if (!has(rig_, needs)) throw InputError({rig_.file, 0}, "no sensor of the twist", "wanted one, which the effect " + id + " needs", "Add a [[sensor]] with reads = \"twist\", or leave the effect out.");
-    for (Parameter p : effect(id).parameters) {
+    for (Parameter p : effect(id).parameters_on(rig_)) {
       p.name = id + "." + p.name;
       model.parameters_.push_back(p);
     }

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <complex>
 #include <limits>
 #include <numbers>
 #include <optional>
@@ -11,6 +10,7 @@
 
 #include "core/effects/effect.h"
 #include "core/in_parallel.h"
+#include "core/spectrum.h"
 #include "fit/first_guess.h"
 #include "fit/mode_order.h"
 #include "fit/undetermined.h"
@@ -128,8 +128,9 @@ void set_starts(JointProblem& joint, const std::map<std::string, double>& starts
   for (Unknown& u : joint.unknowns())
     if (const auto found = starts.find(joint.parameter(u).name); found != starts.end()) {
       const Parameter& p = joint.parameter(u);
-      if (!(found->second >= p.lower && found->second <= p.upper))
-        throw InputError({"--start", 0}, fmt::format("{}={:g}", p.name, found->second), fmt::format("wanted a value from {:g} to {:g}", p.lower, p.upper), "");
+      const auto [lower, upper] = bounds_at(joint.model(), u.parameter, found->second);
+      if (!(found->second >= lower && found->second <= upper))
+        throw InputError({"--start", 0}, fmt::format("{}={:g}", p.name, found->second), fmt::format("wanted a value from {:g} to {:g}", lower, upper), "");
       u.value = found->second;
     }
 }
@@ -152,42 +153,49 @@ class ResidualLines {
       VectorXd left = run.run().channel(p.channels.front()).value - p.output.col(0);
       for (Index k = 0; k < left.size(); ++k)
         if (!(run.channel_weight(0)[k] > 0) || !std::isfinite(left[k])) left[k] = 0;
-      dt_.push_back(run.run().dt);
-      left_.push_back(left / std::max(1e-300, std::sqrt(left.squaredNorm() / static_cast<double>(left.size()))));
+      left /= std::max(1e-300, std::sqrt(left.squaredNorm() / static_cast<double>(left.size())));
+      power_.push_back(fourier(left, padding * left.size()).cwiseAbs2() / static_cast<double>(left.size()));
+      duration_.push_back(run.run().dt * static_cast<double>(left.size()));
     }
   }
-  double power(std::size_t run, double frequency) const {
-    if (!(frequency > 0) || frequency > 0.5 / dt_[run]) return 0;
-    const std::complex<double> turn = std::polar(1.0, -2 * std::numbers::pi * frequency * dt_[run]);
-    std::complex<double> sum = 0, phase = 1;
-    for (const double x : left_[run]) sum += x * phase, phase *= turn;
-    return std::norm(sum) / static_cast<double>(left_[run].size());
-  }
-  double resolution(std::size_t run) const { return 1 / (dt_[run] * static_cast<double>(left_[run].size())); }
+  double power(std::size_t run, double frequency) const { return is_in(run, frequency) ? power_[run][line(run, frequency)] : 0; }
+  bool is_in(std::size_t run, double frequency) const { return frequency > 0 && line(run, frequency) < power_[run].size(); }
+  double resolution(std::size_t run) const { return 1 / duration_[run]; }
 
  private:
-  std::vector<VectorXd> left_;
-  std::vector<double> dt_;
+  static constexpr Index padding = 8;  // the nearest line is at most a sixteenth of the resolution away, and shows 0.987 of the power
+  Index line(std::size_t run, double frequency) const { return static_cast<Index>(std::lround(frequency * duration_[run] * static_cast<double>(padding))); }
+
+  std::vector<VectorXd> power_;
+  std::vector<double> duration_;  // s
 };
 
-/// Starts of a steady tone: where the lines of the residual's spectra, followed through the bounds of its first parameter, add up to most.
+/// Starts of a steady tone: where the lines of the residual's spectra, followed through the bands of its first parameter, add up to most.
 std::vector<VectorXd> tone_starts(const JointProblem& joint, const Effect& e) {
   const ResidualLines lines(joint);
-  VectorXd p(static_cast<Index>(e.parameters.size()));
-  for (Index k = 0; k < p.size(); ++k) p[k] = e.parameters[static_cast<std::size_t>(k)].start;
+  const Rig& rig = joint.model().rig();
+  const std::vector<Parameter>& parameters = e.parameters_on(rig);
+  VectorXd p(static_cast<Index>(parameters.size()));
+  for (Index k = 0; k < p.size(); ++k) p[k] = parameters[static_cast<std::size_t>(k)].start;
+  std::vector<Effect::Band> bands = e.bands;
+  if (bands.empty()) bands.emplace_back(parameters[0].lower, parameters[0].upper);
   std::vector<std::pair<double, double>> found;  // power, parameter
-  const double lower = e.parameters[0].lower, upper = e.parameters[0].upper;
-  for (p[0] = lower; p[0] < upper;) {
-    double power = 0, finest = upper - lower;
-    for (std::size_t r = 0; r < joint.runs().size(); ++r) {
-      const Conditions& c = joint.runs()[r].conditions();
-      if (!e.acts(c)) continue;
-      const double f = e.frequency(joint.model(), c, p);
-      power += lines.power(r, f);
-      finest = std::min(finest, 0.3 * lines.resolution(r) * p[0] / f);
+  for (const auto& [lower, upper] : bands) {
+    bool is_in_a_run = true;
+    for (p[0] = lower; p[0] < upper && is_in_a_run;) {
+      double power = 0, finest = upper - lower;
+      is_in_a_run = false;
+      for (std::size_t r = 0; r < joint.runs().size(); ++r) {
+        const Conditions& c = joint.runs()[r].conditions();
+        if (!e.acts(rig, c)) continue;
+        const double f = e.frequency(joint.model(), c, p);
+        power += lines.power(r, f);
+        is_in_a_run = is_in_a_run || lines.is_in(r, f);
+        finest = std::min(finest, 0.3 * lines.resolution(r) * p[0] / f);
+      }
+      found.emplace_back(power, p[0]);
+      p[0] += finest;
     }
-    found.emplace_back(power, p[0]);
-    p[0] += finest;
   }
   std::sort(found.rbegin(), found.rend());
   std::vector<VectorXd> starts;
@@ -202,7 +210,7 @@ std::vector<VectorXd> tone_starts(const JointProblem& joint, const Effect& e) {
 }
 
 std::vector<VectorXd> starts_of(JointProblem& joint, const Effect& e) {
-  if (e.frequency) return tone_starts(joint, e);
+  if (e.frequency && !e.parameters_on(joint.model().rig()).empty()) return tone_starts(joint, e);
   if (!e.starts_for) return e.starts;
   double largest = 0;
   for (std::size_t r = 0; r < joint.runs().size(); ++r)
@@ -219,7 +227,7 @@ void choose_effect_starts(Arrival& arrival, const FitProblem& problem, const std
   JointProblem& judge = lost ? at_the_rig : arrival.joint;
   for (const std::string& id : added) {
     tell(problem, "looking for " + id);
-    const auto& parameters = effect(id).parameters;
+    const auto& parameters = effect(id).parameters_on(arrival.joint.model().rig());
     const auto set = [&](JointProblem& joint, const VectorXd& values) {
       for (Unknown* u : unknowns_of(joint, id))
         for (std::size_t k = 0; k < parameters.size(); ++k)

@@ -6,6 +6,7 @@
 #include <memory>
 #include <utility>
 
+#include "core/effects/effect.h"
 #include "core/in_parallel.h"
 #include "fit/arrival.h"
 #include "fit/law_smoother.h"
@@ -134,9 +135,9 @@ class GrowingTrust {
 
   VectorXd within_reach(const VectorXd& now, VectorXd then) const {
     for (Index i = 0; i < now.size(); ++i) {
-      const Parameter& p = joint_.parameter(joint_.unknowns()[free_[static_cast<std::size_t>(i)]]);
+      const auto [lower, upper] = bounds_at(joint_.model(), joint_.unknowns()[free_[static_cast<std::size_t>(i)]].parameter, now[i]);
       if (now[i] > 0) then[i] = std::clamp(then[i], now[i] / 2, 2 * now[i]);
-      then[i] = std::clamp(then[i], p.lower, p.upper);
+      then[i] = std::clamp(then[i], lower, upper);
       if (!std::isfinite(then[i])) then[i] = now[i];
     }
     return then;
@@ -179,8 +180,8 @@ class Decays {
     }
     for (const std::size_t i : free_) {
       const Unknown& u = joint.unknowns()[i];
-      const Parameter& p = joint.parameter(u);
-      problem_.unknowns.push_back({joint.name(u), u.value, p.lower, p.upper, false, 0});
+      const auto [lower, upper] = bounds_at(joint.model(), u.parameter, u.value);
+      problem_.unknowns.push_back({joint.name(u), u.value, lower, upper, false, 0});
     }
     for (std::size_t d = 0; d < decays_.size(); ++d) add(decays_[d], linear[d]);
   }

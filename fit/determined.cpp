@@ -44,7 +44,7 @@ VectorXd refit(JointProblem joint, std::size_t held, double value, const VectorX
 }
 
 Valley follow_valley(const JointProblem& joint, std::size_t held, const VectorXd& slope) {
-  const double now = joint.unknowns()[held].value, factor = joint.parameter(joint.unknowns()[held]).name.ends_with("damping_ratio") ? 2 : 1.25;
+  const double now = joint.unknowns()[held].value, factor = is_damping_ratio(joint.parameter(joint.unknowns()[held])) ? 2 : 1.25;
   if (now == 0) return {};
   return {refit(joint, held, now / factor, slope), refit(joint, held, now * factor, slope)};
 }
@@ -166,7 +166,7 @@ class Combinations {
   std::string what_settles(std::size_t i, const std::vector<std::size_t>& tied) const {
     const auto shift = [&](std::size_t h) { return std::abs(influence_.shift(static_cast<Index>(i), static_cast<Index>(h))); };
     const std::size_t most = *std::max_element(tied.begin(), tied.end(), [&](std::size_t a, std::size_t b) { return shift(a) < shift(b); });
-    return what_to_record(joint_.parameter(joint_.unknowns()[influence_.held[most]]).name);
+    return what_to_record(joint_, joint_.unknowns()[influence_.held[most]]);
   }
 
   void follow(const std::vector<std::size_t>& tied) {

@@ -9,6 +9,15 @@
 #include "core/error.h"
 
 namespace unrig {
+namespace {
+
+std::vector<Conditions> conditions_of_all(const std::vector<Run>& runs) {
+  std::vector<Conditions> all;
+  for (const Run& run : runs) all.push_back(conditions_of(run));
+  return all;
+}
+
+}  // namespace
 
 std::vector<std::string> effects_of_option(const std::string& option, const std::vector<std::string>& ids) try {
   std::vector<std::string> known;
@@ -17,6 +26,20 @@ std::vector<std::string> effects_of_option(const std::string& option, const std:
   return known;
 } catch (const std::invalid_argument& e) {
   throw InputError({option, 0}, e.what(), "wanted one of these", "");
+}
+
+void refuse_idle(const std::string& option, const std::vector<std::string>& ids, const Rig& rig, const std::vector<Run>& runs) {
+  const std::vector<Conditions> conditions = conditions_of_all(runs);
+  for (const std::string& id : ids)
+    if (const std::string why = why_idle(effect(id), rig, conditions); !why.empty())
+      throw InputError({option, 0}, id + " can act in none of these runs", "wanted what it needs: " + why, "Leave it out, or give such a run.");
+}
+
+std::vector<std::string> effects_that_act(const Rig& rig, const std::vector<Run>& runs) {
+  std::vector<std::string> ids;
+  for (const Effect& e : effects())
+    if (why_idle(e, rig, conditions_of_all(runs)).empty()) ids.push_back(e.id);
+  return ids;
 }
 
 std::string effect_list() {

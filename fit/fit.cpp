@@ -6,8 +6,10 @@
 
 #include <fmt/format.h>
 
+#include "core/effects/effect.h"
 #include "fit/arrival.h"
 #include "fit/decays_first.h"
+#include "fit/effect_option.h"
 #include "fit/effect_search.h"
 #include "fit/fit_description.h"
 #include "fit/gauss_newton.h"
@@ -83,7 +85,7 @@ AeroelasticModel model_of(const Rig& rig, const std::vector<Run>& runs, Wagner c
   const auto complete = [&](const AeroelasticModel& model) { return effects.empty() ? model : model.with_effects(effects); };
   if (rig.is_modal()) return complete({rig, {}, wagner(circulation)});
   Rig richer = rig;
-  if (std::find(effects.begin(), effects.end(), "higher-mode") != effects.end()) richer.normal.modes = 0;
+  if (std::any_of(effects.begin(), effects.end(), [](const std::string& id) { return effect(id).enriches_basis; })) richer.normal.modes = 0;
   Basis basis;
   for (const Run& run : runs) {
     Basis wanted = make_basis(richer, 0.5 / run.dt, run.density);
@@ -127,6 +129,7 @@ FitResult describe_fit(Arrival& arrival, const FitProblem& problem, Settle first
 
 FitResult fit(const FitProblem& problem) {
   const auto begin = std::chrono::steady_clock::now();
+  refuse_idle("--effect", problem.effects, problem.rig, problem.runs);
   const auto model = std::make_shared<const AeroelasticModel>(model_of(problem.rig, problem.runs, problem.circulation, problem.effects));
   check_names(*model, problem);
   Arrival arrival = problem.effects.empty() ? arrive(problem, model) : arrive_at_effects(problem);

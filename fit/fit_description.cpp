@@ -7,6 +7,7 @@
 
 #include <fmt/format.h>
 
+#include "core/effects/effect.h"
 #include "core/error.h"
 #include "core/fingerprint.h"
 #include "core/gauge_lever.h"
@@ -157,15 +158,15 @@ void describe_parameters(const JointProblem& joint, const ParameterUncertainty& 
     const auto position = std::find(uncertainty.free.begin(), uncertainty.free.end(), i);
     if (position == uncertainty.free.end()) {
       fitted.identified = false;
-      fitted.advice = u.why_held + fmt::format("; held at {:.6g}. ", u.value) + what_to_record(p.name);
+      fitted.advice = u.why_held + fmt::format("; held at {:.6g}. ", u.value) + what_to_record(joint, u);
     } else {
       const Index a = position - uncertainty.free.begin();
       fitted.std_error = std::sqrt(covariance(i, i));
       fitted.std_error_white = std::sqrt(uncertainty.white_covariance(a, a));
       fitted.std_error_coloured = std::sqrt(uncertainty.coloured_covariance(a, a));
-      if (u.value <= p.lower || u.value >= p.upper) {
+      if (const auto [lower, upper] = bounds_at(joint.model(), u.parameter, u.value); u.value <= lower || u.value >= upper) {
         fitted.identified = false;
-        fitted.advice = fmt::format("It ended at its bound {}. ", u.value) + what_to_record(p.name);
+        fitted.advice = fmt::format("It ended at its bound {}. ", u.value) + what_to_record(joint, u);
       } else if (!identified[which]) {
         fitted.identified = false;
         for (const DeterminedCombination& c : result.determined)
@@ -217,14 +218,14 @@ void judge_answer(FitResult& result) {
   const auto lost = std::find_if(result.runs.begin(), result.runs.end(), [](const FittedRun& run) { return run.followed < half && !run.explained() && !run.aside; });
   std::string advice;
   if (result.no_answer = too_few_samples(result.observations, result.variables); !result.no_answer.empty()) {
-    advice = "These runs are too short. ";
+    advice = "These runs are too short. Record longer ones.";
   } else if (!result.converged) {
     result.no_answer = "the fit did not converge: " + result.message;
-    advice = "The fit did not converge. ";
+    advice = "The fit did not converge: its values are no answer.";
   } else if (lost != result.runs.end()) {
     result.no_answer = fmt::format("{}: the model follows only {:.0f} % of the variance of this run. The search ended in a wrong minimum, or this is not a run of this rig. Check rig file and run, give start values (--start), or "
                                    "leave the run out.", lost->file, 100 * std::max(0.0, lost->followed));
-    advice = "The fit does not follow its runs. ";
+    advice = "The fit does not follow its runs: its values are no answer.";
   } else if (std::none_of(result.parameters.begin(), result.parameters.end(), known) && result.determined.empty()) {
     result.no_answer = "these runs determine no parameter";
     for (const FittedParameter& p : result.parameters)
@@ -238,7 +239,7 @@ void judge_answer(FitResult& result) {
   for (FittedParameter& p : result.parameters) {
     if (!p.identified) continue;
     p.identified = false;
-    p.advice = advice + what_to_record(p.name);
+    p.advice = advice;
   }
 }
 

@@ -6,6 +6,7 @@
 #include <numeric>
 #include <set>
 
+#include "core/effects/effect.h"
 #include "core/in_parallel.h"
 
 namespace unrig {
@@ -66,8 +67,8 @@ LeastSquaresProblem JointProblem::least_squares() const {
   LeastSquaresProblem problem;
   problem.least_variance = 1;
   for (const Unknown& u : unknowns_) {
-    const Parameter& p = parameter(u);
-    problem.unknowns.push_back({name(u), u.value, p.lower, p.upper, u.held, 0});
+    const auto [lower, upper] = bounds_at(*model_, u.parameter, u.value);
+    problem.unknowns.push_back({name(u), u.value, lower, upper, u.held, 0});
   }
   for (std::size_t r = 0; r < runs_.size(); ++r) {
     if (runs_[r].is_aside()) continue;

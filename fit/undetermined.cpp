@@ -18,8 +18,8 @@ void hold_undetermined(JointProblem& joint) {
   std::vector<Index> order(joint.unknowns().size());
   for (std::size_t i = 0; i < order.size(); ++i) order[i] = static_cast<Index>(i);
   const auto last_resort = [&](Index i) {
-    const std::string& name = joint.parameter(joint.unknowns()[static_cast<std::size_t>(i)]).name;
-    return name.ends_with(".mass") ? 1 : 0;
+    const Parameter& p = joint.parameter(joint.unknowns()[static_cast<std::size_t>(i)]);
+    return p.role == Role::mass && p.mode >= 0 ? 1 : 0;
   };
   std::stable_sort(order.begin(), order.end(), [&](Index a, Index b) { return last_resort(a) < last_resort(b); });
 
@@ -37,8 +37,10 @@ void hold_undetermined(JointProblem& joint) {
   }
 }
 
+bool is_damping_ratio(const Parameter& p) { return p.role == Role::damping && p.unit == "1"; }
+
 double ignorance(const Parameter& p, double value) {
-  return p.name.ends_with("damping_ratio") ? 0.2 : 0.5 * std::max(std::abs(p.start), std::abs(value));
+  return is_damping_ratio(p) ? 0.2 : 0.5 * std::max(std::abs(p.start), std::abs(value));
 }
 
 double start_of(const Parameter& parameter, const StartValues& starts) {
@@ -63,7 +65,7 @@ double least_visible_damping(const JointProblem& joint, const Parameter& p) {
 double most_error(const JointProblem& joint, const Unknown& u) {
   const Parameter& p = joint.parameter(u);
   constexpr double part = 0.25;
-  return p.name.ends_with("damping_ratio") ? part * std::max(u.value, least_visible_damping(joint, p)) : ignorance(p, u.value);
+  return is_damping_ratio(p) ? part * std::max(u.value, least_visible_damping(joint, p)) : ignorance(p, u.value);
 }
 
 bool hold_weak(JointProblem& joint, const ParameterUncertainty& uncertainty, const StartValues& starts) {
@@ -127,13 +129,12 @@ std::string short_name(const JointProblem& joint, const Unknown& unknown) {
   return unknown.run < 0 ? name : name + " (" + std::filesystem::path(joint.runs()[static_cast<std::size_t>(unknown.run)].run().file).filename().string() + ")";
 }
 
-std::string what_to_record(const std::string& name) {
-  if (name == "apparent_mass_coefficient") return "Record a free decay in the fluid besides one in air.";
-  if (name == "normal_force_slope") return "Record a step of the angle at this speed.";
-  if (name == "torsion.stiffness_scale" || name == "torsion.damping_ratio") return "Record a run that excites torsion: a rapid step, or a pluck off the pitch axis.";
-  if (name.ends_with(".mass")) return "Record a run with a measured force: a free decay fixes stiffness and damping only per mass.";
-  if (name.ends_with(".mount_participation")) return "Record a run with the mount moving.";
-  return "Record a free decay.";
+std::string what_to_record(const JointProblem& joint, const Unknown& unknown) {
+  const Parameter& p = joint.parameter(unknown);
+  if (!p.advice.empty()) return p.advice;
+  if (p.role == Role::mass) return "Record a run with a measured force: a free decay fixes stiffness and damping only per mass.";
+  const bool has_decay = std::any_of(joint.runs().begin(), joint.runs().end(), [](const RunResidual& run) { return run.run().kind == RunKind::pluck; });
+  return has_decay ? "Record a free decay that begins larger, lasts longer or is sampled faster than those here." : "Record a free decay.";
 }
 
 }  // namespace unrig

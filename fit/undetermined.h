@@ -15,6 +15,9 @@ namespace unrig {
 /// a free decay fixes stiffness and damping per mass, and the mass of a structure is what is best known from drawings.
 void hold_undetermined(JointProblem& joint);
 
+/// A damping over the critical one, not in N s/m.
+bool is_damping_ratio(const Parameter& parameter);
+
 /// How far an unknown may be off where nothing but the rig file says what it is: half of itself, for a damping ratio 0.2.
 double ignorance(const Parameter& parameter, double value);
 
@@ -37,7 +40,7 @@ HeldInfluence held_influence(const JointProblem& joint);
 /// "normal_force_slope (step_a.csv)", without folders.
 std::string short_name(const JointProblem& joint, const Unknown& unknown);
 
-/// What to record to determine a parameter.
-std::string what_to_record(const std::string& parameter);
+/// What to record to determine an unknown that these runs do not: the parameter's own advice, or what its role asks for beside the runs that there are.
+std::string what_to_record(const JointProblem& joint, const Unknown& unknown);
 
 }  // namespace unrig

@@ -1,6 +1,7 @@
 #include "core/effects/effect.h"
 
 #include <algorithm>
+#include <cmath>
 #include <numbers>
 #include <stdexcept>
 
@@ -34,6 +35,31 @@ bool has(const Rig& rig, Needs needs) {
   const auto reads_twist = [](const Sensor& s) { return s.reads == SensorKind::twist || s.reads == SensorKind::twist_rate; };
   if (needs == Needs::any_rig) return true;
   return !rig.is_modal() && (needs == Needs::beam || std::any_of(rig.sensors.begin(), rig.sensors.end(), reads_twist));
+}
+
+std::string why_idle(const Effect& e, const Rig& rig, const std::vector<Conditions>& runs) {
+  if (!has(rig, e.needs)) return e.id + (rig.is_modal() ? " needs a beam rig; this one is known only as modes" : " needs a sensor of the twist: [[sensor]] with reads = \"twist\"");
+  if (std::any_of(runs.begin(), runs.end(), [&](const Conditions& c) { return e.acts(rig, c); })) return {};
+  return e.id + " needs " + e.acts_in;
+}
+
+Effect::Band bounds_at(const AeroelasticModel& model, Index parameter, double value) {
+  const Parameter& p = model.parameters()[static_cast<std::size_t>(parameter)];
+  for (const std::string& id : model.effect_ids()) {
+    const Effect& e = effect(id);
+    if (e.bands.empty() || p.name != id + "." + e.parameters_on(model.rig()).front().name) continue;
+    const auto away = [&](const Effect::Band& b) { return std::max({b.first - value, value - b.second, 0.0}); };
+    return *std::min_element(e.bands.begin(), e.bands.end(), [&](const Effect::Band& a, const Effect::Band& b) { return away(a) < away(b); });
+  }
+  return {p.lower, p.upper};
+}
+
+double log_between(Effect::Random& random, double low, double high) { return std::exp(std::uniform_real_distribution<double>(std::log(low), std::log(high))(random)); }
+
+Eigen::VectorXd log_between(Effect::Random& random, const std::vector<Effect::Band>& ranges) {
+  Eigen::VectorXd drawn(static_cast<Index>(ranges.size()));
+  for (std::size_t k = 0; k < ranges.size(); ++k) drawn[static_cast<Index>(k)] = log_between(random, ranges[k].first, ranges[k].second);
+  return drawn;
 }
 
 Index append_signal(LinearSystem& system, const DualMatrix& F, const std::vector<Index>& columns, const DualMatrix& H) {

@@ -21,6 +21,8 @@ double rate_of_memory(const double* argument, const double* p, double* slope, do
   return v * per_velocity;
 }
 
+constexpr const char* sizes = "Record free decays that begin below and far above the yield displacement.";
+
 /// Angular frequency of the first normal mode [rad/s], dry.
 double first_frequency(const AeroelasticModel& model) {
   return model.rig().is_modal() ? 2 * std::numbers::pi * model.rig().modal.front().frequency : model.basis().omega[0];
@@ -39,13 +41,19 @@ Effect bouc_wen() {
   e.summary = "hysteresis of the rig";
   e.equation = "F = -F_y z, z' = v/x_y (1 - |z|^n (b + (1 - b) sign(v z)))";
   e.source = "Wen, J. Engineering Mechanics 102 (1976) 249";
-  e.parameters = {{"force", "N", 0, 0, 1e6, false}, {"yield_displacement", "m", 1e-3, 1e-9, 1, false}, {"shape", "1", 0.5, 0, 1, false}, {"sharpness", "1", 1, 0.5, 4, false}};
+  e.parameters = {{"force", "N", 0, 0, 1e6, false, sizes}, {"yield_displacement", "m", 1e-3, 1e-9, 1, false, sizes}, {"shape", "1", 0.5, 0, 1, false, sizes}, {"sharpness", "1", 1, 0.5, 4, false, sizes}};
   e.starts = {Eigen::Vector4d(0.1, 1e-3, 0.5, 1)};
   e.starts_for = [](const AeroelasticModel& model, double fastest) -> std::vector<Eigen::VectorXd> {  // a tenth of the elastic force, yielding at a tenth and a half of the motion
     const double force = 0.1 * first_mode_momentum(model) * fastest, widest = fastest / first_frequency(model);
     return {Eigen::Vector4d(force, 0.1 * widest, 0.5, 1), Eigen::Vector4d(force, 0.5 * widest, 0.5, 1)};
   };
-  e.acts = [](const Conditions&) { return true; };
+  e.draw = [](const AeroelasticModel& model, double release, Effect::Random& random) -> Eigen::VectorXd {  // beside the load and the deflection that release the pluck
+    const double deflection = release / (first_mode_momentum(model) * first_frequency(model));
+    const Eigen::VectorXd p = log_between(random, {{0.003, 0.3}, {0.03, 0.5}, {0.1, 0.9}});
+    return Eigen::Vector4d(p[0] * release, p[1] * deflection, p[2], 1);
+  };
+  e.states = [](const AeroelasticModel&, const Conditions&) -> Eigen::Index { return 1; };
+  e.acts = [](const Rig&, const Conditions&) { return true; };
   e.apply = [](LinearSystem& system, const EffectContext& c) {
     const Eigen::RowVectorXd shape = first_mode(c.model, system.coordinates);
     DualMatrix force(Eigen::MatrixXd::Constant(1, 1, -c.parameter(0)), c.theta.size());

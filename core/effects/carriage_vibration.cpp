@@ -13,10 +13,13 @@ Effect carriage_vibration() {
   e.summary = "the mount itself is shaken, at a frequency tied to carriage speed";
   e.equation = "mount velocity = a cos 2 pi f t + b sin 2 pi f t, f = kappa U";
   e.source = "Blevins, Flow-Induced Vibration (1990), chapter 7";
-  e.parameters = {{"periods_per_length", "1/m", 10, 0.8, 120, false}};
+  e.parameters = {{"periods_per_length", "1/m", 10, 0.8, 120, false, "Record a run in the stream at another speed."}};
   e.starts = {Eigen::VectorXd::Constant(1, 10)};
   e.frequency = [](const AeroelasticModel&, const Conditions& c, const Eigen::VectorXd& p) { return p[0] * c.speed; };
-  e.acts = [](const Conditions& c) { return c.speed > 0; };
+  e.draw = [](const AeroelasticModel&, double, Effect::Random& random) { return log_between(random, {{3, 40}}); };
+  e.states = [](const AeroelasticModel&, const Conditions&) -> Eigen::Index { return 2; };
+  e.acts_in = "a run in a stream";
+  e.acts = [](const Rig&, const Conditions& c) { return c.speed > 0; };
   e.needs = Needs::beam;
   e.apply = [](LinearSystem& system, const EffectContext& c) {
     const double per_kappa = 2 * std::numbers::pi * c.conditions.speed, omega = c.parameter(0) * per_kappa;

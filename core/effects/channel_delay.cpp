@@ -3,6 +3,12 @@
 
 namespace unrig {
 
+namespace {
+
+constexpr int order = 3;  // of the all-pass, and the number of its states
+
+}  // namespace
+
 /// The gauge channel is late against the angle channel by tau [s]: y_d(t) = y(t - tau), as the all-pass of order three that agrees with exp(-tau p) to the order tau^7 (Pade);
 /// its phase is off by 1e-3 rad where 2 pi f tau = 1.6. A gauge that is early shows as tau at its bound 0.
 /// Source: G. A. Baker and P. Graves-Morris, Pade Approximants (1996), section 1.2.
@@ -12,13 +18,15 @@ Effect channel_delay() {
   e.summary = "gauge channel late against the angle channel";
   e.equation = "gauge(t) = y(t - tau)";
   e.source = "Baker and Graves-Morris, Pade Approximants (1996), section 1.2";
-  e.parameters = {{"time", "s", 0.004, 1e-4, 0.2, false}};
+  e.parameters = {{"time", "s", 0.004, 1e-4, 0.2, false, "Record a faster step of the angle."}};
   for (const double tau : {0.003, 0.008, 0.02, 0.05}) e.starts.push_back(Eigen::VectorXd::Constant(1, tau));
-  e.acts = [](const Conditions& c) { return c.speed > 0; };
+  e.draw = [](const AeroelasticModel&, double, Effect::Random& random) { return log_between(random, {{5e-4, 0.03}}); };
+  e.states = [](const AeroelasticModel&, const Conditions&) -> Eigen::Index { return order; };
+  e.acts_in = "a run in a stream";
+  e.acts = [](const Rig&, const Conditions& c) { return c.speed > 0; };
   e.needs = Needs::beam;
   e.apply = [](LinearSystem& system, const EffectContext& c) {
     if (c.gauge < 0) return;
-    constexpr int order = 3;
     append_gauge_filter(system, c.gauge, delay(c.parameter(0), order, {c.first_parameter, c.theta.size()}));
   };
   return e;

@@ -6,6 +6,8 @@ namespace unrig {
 
 namespace {
 
+constexpr const char* small_motions = "Record free decays until they stand still, from a small load too.";
+
 /// -F tanh(v / v_s)
 double friction(double v, const double* p, double& slope, double* partial) {
   const double t = std::tanh(v / p[1]), bell = 1 - t * t;
@@ -26,13 +28,17 @@ Effect coulomb_friction() {
   e.summary = "dry friction in the rig";
   e.equation = "F = -F_c tanh(v/v_s)";
   e.source = "Coulomb (1781); Pennestri et al., Nonlinear Dynamics 83 (2016) 1785";
-  e.parameters = {{"force", "N", 0, 0, 1e4, false}, {"velocity", "m/s", 1e-3, 1e-6, 1, false}};
+  e.parameters = {{"force", "N", 0, 0, 1e4, false, small_motions}, {"velocity", "m/s", 1e-3, 1e-6, 1, false, small_motions}};
   e.starts = {Eigen::Vector2d(0.1, 1e-3)};
   e.starts_for = [](const AeroelasticModel& model, double fastest) -> std::vector<Eigen::VectorXd> {  // as much as a damping ratio near 0.01
     const double momentum = first_mode_momentum(model);
     return {Eigen::Vector2d(0.01 * momentum * fastest, 0.02 * fastest), Eigen::Vector2d(0.01 * momentum * fastest, 0.002 * fastest)};
   };
-  e.acts = [](const Conditions&) { return true; };
+  e.draw = [](const AeroelasticModel& model, double release, Effect::Random& random) -> Eigen::VectorXd {  // beside the load that releases the pluck, and the speed it gives
+    const double fastest = release / first_mode_momentum(model);
+    return Eigen::Vector2d(log_between(random, 1e-3, 0.1) * release, 0.01 * fastest);
+  };
+  e.acts = [](const Rig&, const Conditions&) { return true; };
   e.apply = [](LinearSystem& system, const EffectContext& c) {
     const Eigen::RowVectorXd shape = first_mode(c.model, system.coordinates);
     append_feedback(system, port(system, c.ports.coordinate, shape[0]), {rate_of(system, shape), c.first_parameter, 2, of_one<friction>});

@@ -13,9 +13,13 @@ Effect cubic_stiffness() {
   e.summary = "stiffness that changes with amplitude";
   e.equation = "F = -k_3 ((h + d)^3 - d^3)";
   e.source = "Duffing, Erzwungene Schwingungen (1918)";
-  e.parameters = {{"coefficient", "N/m^3", 0, -1e30, 1e30, false}, {"static_displacement", "m", 0, -1, 1, true}};
+  e.parameters = {{"coefficient", "N/m^3", 0, -1e30, 1e30, false, "Record free decays from a small and from a large load."}, {"static_displacement", "m", 0, -1, 1, true, "Record a run at this steady load with larger motions."}};
   e.starts = {Eigen::Vector2d(0, 0)};
-  e.acts = [](const Conditions&) { return true; };
+  e.draw = [](const AeroelasticModel& model, double release, Effect::Random& random) -> Eigen::VectorXd {  // share of the linear force where the pluck is released
+    const double stiffness = first_mode_momentum(model) * model.basis().omega[0], deflection = release / stiffness;
+    return Eigen::Vector2d(log_between(random, 1e-3, 0.5) * stiffness / (deflection * deflection), 0);
+  };
+  e.acts = [](const Rig&, const Conditions&) { return true; };
   e.apply = [](LinearSystem& system, const EffectContext& c) {
     const Eigen::RowVectorXd shape = first_mode(c.model, system.coordinates);
     append_feedback(system, port(system, c.ports.coordinate, shape[0]), {displacement_of(system, shape), c.first_parameter, 2, of_one<cubic_law>});

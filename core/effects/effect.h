@@ -1,6 +1,9 @@
 #pragma once
 #include <Eigen/Core>
+#include <functional>
+#include <random>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "core/aeroelastic_model.h"
@@ -34,28 +37,57 @@ struct EffectContext {
 enum class Needs { any_rig, beam, twist_reading };
 bool has(const Rig& rig, Needs needs);
 
-/// One candidate for missing physics (correct/manual/effects.md): what it is, where it can act, and how it changes the linear system of a run.
+/// One candidate for missing physics (correct/manual/effects.md): what it is, where it can act, how it changes the linear system of a run, how it is searched for,
+/// and what a trial hides of it. Nothing outside core/effects knows an effect by its id.
 ///
-/// To add one: a file in core/effects/ that defines it, and a line each in core/effects/list.h and table.cpp. Fit and simulation pick it up from there.
+/// To add one: a file in core/effects/ that defines it, and a line each in core/effects/list.h and table.cpp. Fit, simulation, diagnosis and trial pick it up from there.
 struct Effect {
+  using Random = std::mt19937_64;
+  using Band = std::pair<double, double>;
+
   std::string id;
   std::string summary;   ///< one line
   std::string equation;  ///< as a person would write it
   std::string source;
-  std::vector<Parameter> parameters;  ///< names without the id
+  /// Names without the id; `advice` says what to record to determine each.
+  std::vector<Parameter> parameters;
+  /// The same on a rig known only as modes, where they are others.
+  std::vector<Parameter> modal_parameters;
+  const std::vector<Parameter>& parameters_on(const Rig& rig) const { return rig.is_modal() && !modal_parameters.empty() ? modal_parameters : parameters; }
+  /// Where the first parameter may be, if not everywhere between its bounds: ascending, apart. A search stays in the band that it starts in.
+  std::vector<Band> bands;
   /// Values from which a search should start, besides the parameters' own: one vector per start. The linear unknowns (amplitudes) follow by themselves.
   std::vector<Eigen::VectorXd> starts;
   /// Of a nonlinear effect whose starts depend on the size of the response: from the largest argument that its law sees in the runs.
-  std::vector<Eigen::VectorXd> (*starts_for)(const AeroelasticModel&, double largest_argument) = nullptr;
-  /// Of an effect that is a steady tone: its frequency [Hz] in a run, for its parameters. A search then follows the lines of the residual's spectrum
-  /// through the bounds of the first parameter, in place of `starts`.
-  double (*frequency)(const AeroelasticModel&, const Conditions&, const Eigen::VectorXd& parameters) = nullptr;
-  /// Whether it can act at all under these conditions.
-  bool (*acts)(const Conditions& conditions) = nullptr;
-  void (*apply)(LinearSystem& system, const EffectContext& context) = nullptr;
-  bool in_the_load = false;   ///< it changes the load that a rigid rig would feel, which `correct` must not take out
+  std::function<std::vector<Eigen::VectorXd>(const AeroelasticModel&, double largest_argument)> starts_for;
+  /// Of an effect that shows as a line in the spectrum: its frequency [Hz] in a run, for its parameters. A search then follows the lines of the residual's spectrum
+  /// through the bands of the first parameter, in place of `starts`. Only on rigs on which it has parameters.
+  std::function<double(const AeroelasticModel&, const Conditions&, const Eigen::VectorXd& parameters)> frequency;
+  /// Whether it can act at all in a run under these conditions.
+  std::function<bool(const Rig&, const Conditions&)> acts;
+  /// Such runs in words, behind "it needs"; empty where it acts in all.
+  std::string acts_in;
+  /// How many states it adds to the system of such a run; none: 0. It does not see theta, on which the number of states may not depend: searches keep initial
+  /// states from one theta to the next. AeroelasticModel::system holds `apply` to it.
+  std::function<Eigen::Index(const AeroelasticModel&, const Conditions&)> states;
+  std::function<void(LinearSystem& system, const EffectContext& context)> apply;
+  /// Parameters of a hidden one, drawn for `unrig trial`: from far below what noise lets one see to what nobody overlooks. `release`: load [N] that releases the
+  /// plucks. Sizes of signals are drawn with their runs. Without it the start values are taken.
+  std::function<Eigen::VectorXd(const AeroelasticModel& rig, double release, Random& random)> draw;
+  bool enriches_basis = false;  ///< on a beam its model has all modes below the Nyquist frequency, in place of the number in the rig file
+  bool in_the_load = false;     ///< it changes the load that a rigid rig would feel, which `correct` must not take out
   Needs needs = Needs::any_rig;
 };
+
+/// "carriage-vibration needs a run in a stream": why it acts in none of these runs of the rig; empty if it does in one.
+std::string why_idle(const Effect& effect, const Rig& rig, const std::vector<Conditions>& runs);
+
+/// Lowest and highest value of a parameter of `model`: its bounds, or those of the band of its effect that is nearest to `value`.
+Effect::Band bounds_at(const AeroelasticModel& model, Eigen::Index parameter, double value);
+
+/// Evenly in the logarithm from `low` to `high`, both positive; and one such value for each of `ranges`, in their order.
+double log_between(Effect::Random& random, double low, double high);
+Eigen::VectorXd log_between(Effect::Random& random, const std::vector<Effect::Band>& ranges);
 
 /// All effects, in the order in which users are shown them.
 const std::vector<Effect>& effects();

@@ -12,10 +12,14 @@ Effect elastic_coupling() {
   e.summary = "springs that act beside the pitch axis";
   e.equation = "F = -k_c theta, M = -k_c h";
   e.source = "Bisplinghoff, Ashley and Halfman, Aeroelasticity (1955)";
-  e.parameters = {{"stiffness", "N/rad", 0, -1e9, 1e9, false}};
+  e.parameters = {{"stiffness", "N/rad", 0, -1e9, 1e9, false, "Record a pluck off the pitch axis, with a sensor of the twist."}};
   e.starts = {Eigen::VectorXd::Zero(1)};
   e.needs = Needs::twist_reading;
-  e.acts = [](const Conditions&) { return true; };
+  e.draw = [](const AeroelasticModel& model, double, Effect::Random& random) -> Eigen::VectorXd {  // the springs beside the axis by up to a third of the semichord
+    const double stiffness = first_mode_momentum(model) * model.basis().omega[0];
+    return Eigen::VectorXd::Constant(1, stiffness * model.rig().semichord() * log_between(random, 1e-3, 0.3));
+  };
+  e.acts = [](const Rig&, const Conditions&) { return true; };
   e.apply = [](LinearSystem& system, const EffectContext& c) {
     const Basis& basis = c.model.basis();
     if (basis.torsion_modes < 1 || basis.normal_modes < 1) return;

@@ -43,10 +43,11 @@ Effect freeplay() {
   e.summary = "backlash, a gap in the torsional drive";
   e.equation = "M = -k (theta - clamp(theta, -delta, delta))";
   e.source = "Dowell et al., A Modern Course in Aeroelasticity (2015), chapter 11";
-  e.parameters = {{"half_gap", "rad", 0, 0, 0.5, false}};
+  e.parameters = {{"half_gap", "rad", 0, 0, 0.5, false, "Record a pluck off the pitch axis or a rapid step, with torsion that crosses the gap."}};
   e.starts = {Eigen::VectorXd::Constant(1, 1e-3)};
   e.starts_for = [](const AeroelasticModel&, double widest) -> std::vector<Eigen::VectorXd> { return {Eigen::VectorXd::Constant(1, 0.05 * widest), Eigen::VectorXd::Constant(1, 0.3 * widest)}; };
-  e.acts = [](const Conditions&) { return true; };
+  e.draw = [](const AeroelasticModel&, double, Effect::Random& random) { return log_between(random, {{3e-5, 3e-3}}); };
+  e.acts = [](const Rig&, const Conditions&) { return true; };
   e.needs = Needs::beam;
   e.apply = [](LinearSystem& system, const EffectContext& c) {
     const Rig& rig = c.model.rig();

@@ -11,9 +11,11 @@ Effect gauge_drift() {
   e.summary = "slow zero drift of the gauge";
   e.equation = "gauge += c exp(-t/tau)";
   e.source = "Window, Strain Gauge Technology (1992)";
-  e.parameters = {{"time", "s", 20, 2, 1e3, false}};
+  e.parameters = {{"time", "s", 20, 2, 1e3, false, "Record a longer run."}};
   for (const double tau : {3.0, 10.0, 40.0, 200.0}) e.starts.push_back(Eigen::VectorXd::Constant(1, tau));
-  e.acts = [](const Conditions&) { return true; };
+  e.draw = [](const AeroelasticModel&, double, Effect::Random& random) { return log_between(random, {{3, 40}}); };
+  e.states = [](const AeroelasticModel&, const Conditions&) -> Eigen::Index { return 1; };
+  e.acts = [](const Rig&, const Conditions&) { return true; };
   e.apply = [](LinearSystem& system, const EffectContext& c) {
     if (c.gauge < 0) return;
     const double tau = c.parameter(0);

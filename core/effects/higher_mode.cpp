@@ -1,9 +1,46 @@
+#include <numbers>
+
 #include "core/effects/list.h"
 
 namespace unrig {
 
-/// Structural modes that the rig file left out: all that its flexibility matrices hold below the Nyquist frequency, and as many more as the frequencies in
+namespace {
+
+/// Appends to `system` one mode more of a rig known as modes, with the parameters f, zeta, p, p_m. Only the gauge reads it.
+void append_mode(LinearSystem& system, const EffectContext& c) {
+  const ModalMode& like = c.model.rig().modal.front();
+  const double per_hertz = 2 * std::numbers::pi, omega = per_hertz * c.parameter(0), zeta = c.parameter(1);
+  const Eigen::Index n = system.states(), q = n, v = n + 1;
+  system.A = system.A.grown(n + 2, n + 2);
+  system.B = system.B.grown(n + 2, system.B.cols());
+  system.C = system.C.grown(system.C.rows(), n + 2);
+  system.A.value(q, v) = 1;
+  system.A.value(v, q) = -omega * omega;
+  system.A.value(v, v) = -2 * zeta * omega;
+  system.B.value(v, c.ports.force) = c.parameter(2) / like.mass;
+  system.B.value(v, c.ports.mount + 1) = -c.parameter(3);
+  if (c.gauge >= 0) system.C.value(c.gauge, q) = like.gauge_gain;
+  const auto slope = [&](DualMatrix& m, Eigen::Index parameter, Eigen::Index column, double amount) {
+    Eigen::MatrixXd change = Eigen::MatrixXd::Zero(m.rows(), m.cols());
+    change(v, column) = amount;
+    m.add_partial(c.first_parameter + parameter, change);
+  };
+  slope(system.A, 0, q, -2 * omega * per_hertz);
+  slope(system.A, 0, v, -2 * zeta * per_hertz);
+  slope(system.A, 1, v, -2 * omega);
+  slope(system.B, 2, c.ports.force, 1 / like.mass);
+  slope(system.B, 3, c.ports.mount + 1, -1);
+  system.settling.insert(system.settling.end(), {q, v});
+}
+
+constexpr const char* excite = "Record a run that excites this mode: a pluck or a blow elsewhere.";
+
+}  // namespace
+
+/// Structural modes that the rig file left out. Of a beam: all that its flexibility matrices hold below the Nyquist frequency, and as many more as the frequencies in
 /// the fluid need, in place of the number in `normal.modes`. Stiffness scale and damping ratio of the chain hold for them too, so that it has no parameters.
+/// Of a rig known only as modes: one mode more, q'' + 2 zeta omega q' + omega^2 q = p F/m_1 - p_m a, read by the gauge with the gain of the first mode; m_1 the mass of that in the
+/// rig file, F the force [N], a the acceleration of the mount, omega = 2 pi f.
 /// Source: seed, Eq. 3.3-3.4 and section 4.2.3 (what one normal mode leaves near 15 Hz).
 Effect higher_mode() {
   Effect e;
@@ -12,9 +49,18 @@ Effect higher_mode() {
   e.equation = "x'' + 2 zeta omega_k x' + omega_k^2 x = phi_k^T F for every k";
   e.source = "seed, Eq. 3.3-3.4 and section 4.2.3";
   e.starts = {Eigen::VectorXd(0)};
-  e.acts = [](const Conditions&) { return true; };
-  e.apply = [](LinearSystem&, const EffectContext&) {};  // a model with this effect is made with a richer basis (fit/model_of)
-  e.needs = Needs::beam;
+  e.modal_parameters = {{"frequency", "Hz", 10, 1e-2, 1e6, false, excite},
+                        {"damping_ratio", "1", 0.01, 0, 0.9, false, excite, Role::damping},
+                        {"participation", "1", 0, -1e6, 1e6, false, "Record a run with a measured force."},
+                        {"mount_participation", "1", 0, -1e6, 1e6, false, "Record a run with the mount moving."}};
+  e.frequency = [](const AeroelasticModel&, const Conditions&, const Eigen::VectorXd& p) { return p[0]; };  // of a rig of modes: the line that it leaves
+  e.acts_in = "a rig file that leaves modes out (modes = N)";
+  e.acts = [](const Rig& rig, const Conditions&) { return rig.is_modal() || rig.normal.modes > 0; };
+  e.states = [](const AeroelasticModel& model, const Conditions&) -> Eigen::Index { return model.rig().is_modal() ? 2 : 0; };
+  e.apply = [](LinearSystem& system, const EffectContext& c) {
+    if (c.model.rig().is_modal()) append_mode(system, c);
+  };
+  e.enriches_basis = true;
   return e;
 }
 

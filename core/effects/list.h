@@ -22,5 +22,6 @@ Effect channel_delay();
 Effect twist_stiffness();
 Effect elastic_coupling();
 Effect bouc_wen();
+Effect cubic_damping();
 
 }  // namespace unrig

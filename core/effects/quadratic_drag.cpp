@@ -24,9 +24,11 @@ Effect quadratic_drag() {
   e.summary = "drag of the moving section, force ~ velocity times its magnitude";
   e.equation = "F = -C_d (rho/2) c l |h'| h' on each strip";
   e.source = "Morison et al., Petroleum Transactions 189 (1950) 149";
-  e.parameters = {{"coefficient", "1", 0, 0, 1e4, false}};
+  e.parameters = {{"coefficient", "1", 0, 0, 1e4, false, "Record free decays in the fluid from a small and from a large load."}};
   e.starts = {Eigen::VectorXd::Constant(1, 2.0)};
-  e.acts = [](const Conditions& c) { return c.density > 100 || c.density == 0; };  // in air it is a thousand times less, and drowns in the damping of the rig
+  e.draw = [](const AeroelasticModel&, double, Effect::Random& random) { return log_between(random, {{0.3, 20}}); };
+  e.acts_in = "a fluid: with a density of 0 there is no drag on strips (damping that grows with amplitude without a fluid is cubic-damping)";
+  e.acts = [](const Rig& rig, const Conditions& c) { return rig.is_modal() || c.density > 0; };
   e.apply = [](LinearSystem& system, const EffectContext& c) {
     const Rig& rig = c.model.rig();
     const Eigen::Index n = system.coordinates;

@@ -1,4 +1,5 @@
 #include <cmath>
+#include <numbers>
 
 #include "core/effects/list.h"
 
@@ -6,7 +7,8 @@ namespace unrig {
 
 namespace {
 
-constexpr double onset = 8 * 3.14159265358979323846 / 180;  // below it the flow of a usual section stays attached
+constexpr double onset = 8 * std::numbers::pi / 180;  // below it the flow of a usual section stays attached
+constexpr const char* steps = "Record a step of the angle from more than 8 degrees, and let it run for some hundred semichords.";
 
 }  // namespace
 
@@ -20,9 +22,12 @@ Effect separation_lag() {
   e.summary = "slow loss of lift after the step at high onset angle";
   e.equation = "phi(s) -> phi(s) - D (1 - exp(-s/T_s))";
   e.source = "Leishman and Beddoes, J. American Helicopter Society 34(3) (1989) 3";
-  e.parameters = {{"loss", "1", 0, -2, 2, false}, {"time", "1", 10, 0.5, 300, false}};
+  e.parameters = {{"loss", "1", 0, -2, 2, false, steps}, {"time", "1", 10, 0.5, 300, false, steps}};
   for (const double s : {4.0, 10.0, 25.0}) e.starts.push_back(Eigen::Vector2d(0.1, s));
-  e.acts = [](const Conditions& c) { return c.speed > 0 && std::abs(c.onset_angle) > onset; };
+  e.draw = [](const AeroelasticModel&, double, Effect::Random& random) { return log_between(random, {{0.01, 0.4}, {4, 40}}); };
+  e.states = [](const AeroelasticModel& model, const Conditions&) -> Eigen::Index { return model.circulation().rate.size() > 0 ? static_cast<Eigen::Index>(model.rig().submerged.size()) : 0; };
+  e.acts_in = "a run in a stream at more than 8 degrees before the motion";
+  e.acts = [](const Rig&, const Conditions& c) { return c.speed > 0 && std::abs(c.onset_angle) > onset; };
   e.in_the_load = true;
   e.needs = Needs::beam;
   e.apply = [](LinearSystem& system, const EffectContext& c) {

@@ -25,6 +25,7 @@ const std::vector<Effect>& effects() {
       twist_stiffness(),
       elastic_coupling(),
       bouc_wen(),
+      cubic_damping(),
   };
   return table;
 }

@@ -15,11 +15,14 @@ Effect tank_wave() {
   e.summary = "decaying sloshing wave of the tank";
   e.equation = "F(t) = exp(-t/tau) (a cos 2 pi f t + b sin 2 pi f t) on the strips";
   e.source = "Faltinsen and Timokha, Sloshing (2009), chapter 1";
-  e.parameters = {{"frequency", "Hz", 0.5, 0.05, 5, false}, {"decay_time", "s", 8, 0.3, 1e3, false}};
+  e.parameters = {{"frequency", "Hz", 0.5, 0.05, 5, false, "Record a longer run in the fluid."}, {"decay_time", "s", 8, 0.3, 1e3, false, "Record a longer run in the fluid."}};
   for (const double tau : {3.0, 12.0})
     for (double f = 0.15; f < 3; f *= 1.13) e.starts.push_back(Eigen::Vector2d(f, tau));
   e.needs = Needs::beam;
-  e.acts = [](const Conditions& c) { return c.density > 100; };
+  e.draw = [](const AeroelasticModel&, double, Effect::Random& random) { return log_between(random, {{0.2, 1.5}, {3, 15}}); };
+  e.states = [](const AeroelasticModel&, const Conditions&) -> Eigen::Index { return 2; };
+  e.acts_in = "a run in a fluid of more than 100 kg/m^3";
+  e.acts = [](const Rig&, const Conditions& c) { return c.density > 100; };
   e.apply = [](LinearSystem& system, const EffectContext& c) {
     constexpr double pi = std::numbers::pi;
     const double f = c.parameter(0), tau = c.parameter(1), omega = 2 * pi * f;

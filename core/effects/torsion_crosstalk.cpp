@@ -11,10 +11,11 @@ Effect torsion_crosstalk() {
   e.summary = "bridge not purely sensitive to the normal force";
   e.equation = "gauge += kappa M_t";
   e.source = "seed, section 1.2";
-  e.parameters = {{"per_torque", "1/m", 0, -50, 50, false}};
+  e.parameters = {{"per_torque", "1/m", 0, -50, 50, false, "Record a run that excites torsion: a rapid step, or a pluck off the pitch axis."}};
   e.starts = {Eigen::VectorXd::Zero(1)};
   e.needs = Needs::beam;
-  e.acts = [](const Conditions&) { return true; };
+  e.draw = [](const AeroelasticModel&, double, Effect::Random& random) { return log_between(random, {{0.05, 10}}); };
+  e.acts = [](const Rig&, const Conditions&) { return true; };
   e.apply = [](LinearSystem& system, const EffectContext& c) {
     const Rig& rig = c.model.rig();
     if (c.gauge < 0 || rig.is_modal()) return;

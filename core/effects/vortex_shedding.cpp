@@ -23,10 +23,13 @@ Effect vortex_shedding() {
   e.summary = "narrow-band force at a Strouhal frequency of flow speed and angle";
   e.equation = "F(t) = a cos 2 pi f t + b sin 2 pi f t on the strips, f = St U / (c sin alpha)";
   e.source = "Fage and Johansen, Proc. R. Soc. London A 116 (1927) 170";
-  e.parameters = {{"strouhal", "1", 0.17, 0.05, 0.6, false}};
+  e.parameters = {{"strouhal", "1", 0.17, 0.05, 0.6, false, "Record a longer run in the stream at more than 8 degrees."}};
   e.starts = {Eigen::VectorXd::Constant(1, 0.17)};
   e.frequency = [](const AeroelasticModel& model, const Conditions& c, const Eigen::VectorXd& p) { return p[0] * per_strouhal(c, 2 * model.rig().semichord()); };
-  e.acts = [](const Conditions& c) { return c.speed > 0 && std::abs(c.onset_angle) > separated; };
+  e.draw = [](const AeroelasticModel&, double, Effect::Random& random) { return log_between(random, {{0.12, 0.25}}); };
+  e.states = [](const AeroelasticModel&, const Conditions&) -> Eigen::Index { return 2; };
+  e.acts_in = "a run in a stream at more than 8 degrees before the motion";
+  e.acts = [](const Rig&, const Conditions& c) { return c.speed > 0 && std::abs(c.onset_angle) > separated; };
   e.needs = Needs::beam;
   e.apply = [](LinearSystem& system, const EffectContext& c) {
     const double per_st = 2 * std::numbers::pi * per_strouhal(c.conditions, 2 * c.model.rig().semichord());

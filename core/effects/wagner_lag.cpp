@@ -11,9 +11,11 @@ Effect wagner_lag() {
   e.summary = "circulation that builds up differently from Wagner's function";
   e.equation = "phi(s) = 1 - a sum_k A_k exp(-r b_k s)";
   e.source = "R. T. Jones, NACA Report 681 (1940)";
-  e.parameters = {{"rate", "1", 1, 0.05, 20, false}, {"amplitude", "1", 1, 0, 1.9, false}};
+  e.parameters = {{"rate", "1", 1, 0.05, 20, false, "Record a faster step of the angle."}, {"amplitude", "1", 1, 0, 1.9, false, "Record a faster step of the angle."}};
   e.starts = {Eigen::Vector2d(1, 1), Eigen::Vector2d(0.4, 1), Eigen::Vector2d(2.5, 1)};
-  e.acts = [](const Conditions& c) { return c.speed > 0; };
+  e.draw = [](const AeroelasticModel&, double, Effect::Random& random) { return log_between(random, {{0.25, 0.9}, {1, 1}}); };
+  e.acts_in = "a run in a stream";
+  e.acts = [](const Rig&, const Conditions& c) { return c.speed > 0; };
   e.in_the_load = true;
   e.needs = Needs::beam;
   e.apply = [](LinearSystem& system, const EffectContext& c) {

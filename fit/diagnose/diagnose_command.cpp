@@ -54,6 +54,7 @@ int diagnose_command(int argc, char** argv) {
   for (const std::string& path : runs) problem.runs.push_back(read_run(path));
   for (const std::string& path : heldout) problem.heldout.push_back(read_run(path));
   problem.effects = effects_of_option("--effects", ids);
+  refuse_idle("--effects", problem.effects, problem.rig, problem.runs);
   Progress progress;
   problem.progress = [&](const std::string& what) { progress(what); };
   const Diagnosis diagnosis = diagnose(problem);

@@ -52,8 +52,9 @@ bool plausible(const Trial& trial) {
   const JointProblem& joint = trial.arrival.joint;
   return leaves_nothing(trial) || std::none_of(joint.unknowns().begin(), joint.unknowns().end(), [&](const Unknown& u) {
     const Parameter& p = joint.parameter(u);
+    const auto [lower, upper] = bounds_at(joint.model(), u.parameter, u.value);
     const auto at = [&](double bound) { return bound != 0 && std::abs(u.value - bound) < 1e-6 * std::abs(bound); };
-    return !u.held && p.name.starts_with(trial.effects.back() + ".") && (at(p.lower) || at(p.upper));
+    return !u.held && p.name.starts_with(trial.effects.back() + ".") && (at(lower) || at(upper));
   });
 }
 
@@ -71,7 +72,7 @@ bool any_leaves_nothing(const Trials& trials) { return std::any_of(trials.begin(
 void fit_anew(const FitProblem& problem, Trials& trials) {
   in_parallel(trials.size(), [&](std::size_t i) {
     if (decays_decide(trials[i])) return;
-    if (i < most_in_full || effect(trials[i].effects.back()).parameters.empty()) fit_from_first_guesses(problem, trials[i]);
+    if (i < most_in_full || effect(trials[i].effects.back()).parameters_on(problem.rig).empty()) fit_from_first_guesses(problem, trials[i]);
   });
 }
 
@@ -80,7 +81,7 @@ void fit_others_anew(const FitProblem& problem, Trials& trials) {
   if (trials.size() <= most_in_full) return;
   in_parallel(trials.size() - most_in_full, [&](std::size_t i) {
     Trial& trial = trials[most_in_full + i];
-    if (!effect(trial.effects.back()).parameters.empty()) fit_from_first_guesses(problem, trial);
+    if (!effect(trial.effects.back()).parameters_on(problem.rig).empty()) fit_from_first_guesses(problem, trial);
   });
 }
 
@@ -112,14 +113,14 @@ Selection::Selection(const DiagnoseProblem& problem, const FitProblem& fit_probl
 /// Effects that can act in at least one of the runs of this rig, are not at work yet, and not `hopeless`.
 Strings Selection::candidates(const Strings& at_work, const Strings& hopeless) const {
   const JointProblem& joint = baseline_.arrival.joint;
+  std::vector<Conditions> conditions;
+  for (const RunResidual& run : joint.runs()) conditions.push_back(run.conditions());
   Strings ids;
   for (const Effect& e : effects()) {
     if (!problem_.effects.empty() && std::find(problem_.effects.begin(), problem_.effects.end(), e.id) == problem_.effects.end()) continue;
     if (std::find(at_work.begin(), at_work.end(), e.id) != at_work.end()) continue;
     if (std::find(hopeless.begin(), hopeless.end(), e.id) != hopeless.end()) continue;
-    if (!has(problem_.rig, e.needs)) continue;
-    if (e.id == "higher-mode" && problem_.rig.normal.modes == 0) continue;  // the model has them all
-    if (std::any_of(joint.runs().begin(), joint.runs().end(), [&](const RunResidual& run) { return e.acts(run.conditions()); })) ids.push_back(e.id);
+    if (why_idle(e, problem_.rig, conditions).empty()) ids.push_back(e.id);
   }
   return ids;
 }
@@ -137,7 +138,7 @@ Trials Selection::try_one_more(const Trial& base, const Strings& hopeless) {
   const double best_score = prepared.empty() ? 0 : prepared.front()->score;
   Trials linear, others, unpromising;
   for (const auto& trial : prepared) {
-    const bool promises_nothing = effect(trial->effects.back()).parameters.empty();  // it may hold all the same
+    const bool promises_nothing = effect(trial->effects.back()).parameters_on(problem_.rig).empty();  // it may hold all the same
     const bool follows_law = nonlinear(*trial), far = base.reduced_chi2() > twice_the_noise;
     const bool promises = linear.size() + others.size() < most_refits && (trial->score > 0.25 * best_score || (follows_law && far));
     const bool step_says_nothing = far && brings_a_law(*trial);  // a law far from the truth
@@ -218,9 +219,9 @@ Trial Selection::without_stand_in(const Trials& tried) {
 /// A law is not found from far away where the rig's modes are too few for its trajectory: where nothing explains what is missing, every effect is tried beside the modes that were left out too.
 void Selection::try_with_all_modes(Trials& tried) {
   if (any_leaves_nothing(tried) || baseline_.reduced_chi2() < nearly_explained) return;
-  const auto modes = std::find_if(tried.begin(), tried.end(), [](const Trial& t) { return t.effects == Strings{"higher-mode"}; });
+  const auto modes = std::find_if(tried.begin(), tried.end(), [](const Trial& t) { return t.effects.size() == 1 && effect(t.effects.front()).enriches_basis; });
   if (modes == tried.end()) return;
-  tell("trying what may be missing beside higher-mode");
+  tell("trying what may be missing beside " + modes->effects.front());
   const Trial base = *modes;
   for (Trial& t : try_one_more(base, {}))
     if (bic_difference(t, base) < -decisive) tried.push_back(std::move(t));

@@ -8,11 +8,11 @@
 #include <mutex>
 #include <nlohmann/json.hpp>
 
-#include "core/effects/effect.h"
 #include "core/error.h"
 #include "core/in_parallel.h"
 #include "fit/diagnose/diagnose.h"
 #include "fit/diagnose/trial_campaign.h"
+#include "fit/effect_option.h"
 
 namespace unrig {
 namespace {
@@ -129,15 +129,22 @@ std::string name_of(Strings effects) {
 TrialResult run_trials(const TrialProblem& problem) {
   check_for_trials(problem.rig);
   Strings ids = problem.effects;
-  if (ids.empty())
-    for (const Effect& e : effects())
-      if (has(problem.rig, e.needs)) ids.push_back(e.id);
+  std::mt19937_64 any;
+  const std::vector<PlannedRun> planned = plan(problem, any);
+  std::vector<Run> runs;
+  for (const PlannedRun& run : planned) {
+    runs.push_back(run.fine);
+    runs.back().dt *= static_cast<double>(PlannedRun::finer);
+  }
+  Rig hiding = problem.rig;
+  hiding.normal.modes = 1;  // as the rig of a campaign that hides modes
+  if (ids.empty()) ids = effects_that_act(hiding, runs);
+  else refuse_idle("--effects", ids, hiding, runs);
   if (const std::size_t at_a_time = problem.pairs ? 2 : 1; problem.outside && ids.size() <= at_a_time)
     throw InputError({"--outside", 0}, fmt::format("{} to hide in turn, {} at a time", ids.size(), at_a_time), "wanted candidates beside what is hidden", "Name more of --effects.");
   TrialResult result;
   result.seed = problem.seed;
-  std::mt19937_64 any;
-  for (const PlannedRun& run : plan(problem, any)) result.noise = std::max(result.noise, run.noise);
+  for (const PlannedRun& run : planned) result.noise = std::max(result.noise, run.noise);
   for (const Run& run : problem.recordings) result.recordings.push_back(run.file);
   result.outcomes.resize(static_cast<std::size_t>(problem.trials));
   std::mutex mutex;

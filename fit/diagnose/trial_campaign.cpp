@@ -15,31 +15,12 @@ using Eigen::VectorXd;
 using Random = std::mt19937_64;
 using Strings = std::vector<std::string>;
 
-/// From far below what the noise lets one see to what nobody overlooks; parameter by parameter, evenly in the logarithm.
-struct Range {
-  double low, high;
-};
-struct Ranges {
-  const char* effect;
-  std::vector<Range> parameters;
-};
-const std::vector<Ranges> ranges{
-    {"quadratic-drag", {{0.3, 20}}},       {"wagner-lag", {{0.25, 0.9}, {1, 1}}},       {"separation-lag", {{0.01, 0.4}, {4, 40}}}, {"vortex-shedding", {{0.12, 0.25}}},
-    {"tank-wave", {{0.2, 1.5}, {3, 15}}},  {"carriage-vibration", {{3, 40}}},           {"gauge-lowpass", {{4, 150}, {0.7, 0.7}}},  {"torsion-crosstalk", {{0.05, 10}}},
-    {"gauge-drift", {{3, 40}}},            {"mains-hum", {{49.8, 50.2}}},               {"channel-delay", {{5e-4, 0.03}}},          {"freeplay", {{3e-5, 3e-3}}},
-};
-constexpr Range signal_size{0.2, 20};  // r.m.s. in the run that it disturbs most, over the noise
+constexpr Effect::Band signal_size{0.2, 20};  // r.m.s. in the run that it disturbs most, over the noise
 
-/// Friction and the cubic spring are measured by what releases the pluck.
 VectorXd draw_parameters(const Effect& e, const AeroelasticModel& model, double release, Random& random) {
+  if (e.draw) return e.draw(model, release, random);
   VectorXd p(static_cast<Index>(e.parameters.size()));
   for (Index k = 0; k < p.size(); ++k) p[k] = e.parameters[static_cast<std::size_t>(k)].start;
-  const double angular = model.basis().omega[0], stiffness = first_mode_momentum(model) * angular, deflection = release / stiffness;
-  if (e.id == "coulomb-friction") p << log_between(random, 1e-3, 0.1) * release, 0.01 * deflection * angular;
-  if (e.id == "cubic-stiffness") p[0] = log_between(random, 1e-3, 0.5) * stiffness / (deflection * deflection);
-  for (const Ranges& r : ranges)
-    if (e.id == r.effect)
-      for (std::size_t k = 0; k < r.parameters.size(); ++k) p[static_cast<Index>(k)] = log_between(random, r.parameters[k].low, r.parameters[k].high);
   return p;
 }
 
@@ -63,8 +44,27 @@ SimulateProblem problem_of(const AeroelasticModel& model, const VectorXd& theta,
   return problem;
 }
 
-VectorXd gauge(const SimulateProblem& problem) { return simulate(problem).run.channel("gauge").value; }
 double rms(const VectorXd& x) { return std::sqrt(x.squaredNorm() / static_cast<double>(x.size())); }
+
+/// Columns that a diagnosis is given: the angle, the gauge, and every sensor.
+bool is_recorded(const Channel& channel, const Rig& rig) {
+  return channel.name == "alpha" || channel.name == "gauge" || std::any_of(rig.sensors.begin(), rig.sensors.end(), [&](const Sensor& s) { return s.column == channel.name; });
+}
+
+/// Noise of a channel: a sensor is as good as the gauge, in proportion to what both read.
+double noise_of(const Channel& channel, const Run& run, const PlannedRun& planned) {
+  if (channel.name == "alpha") return planned.angle_noise;
+  const auto swing = [](const VectorXd& x) { return rms(x.array() - x.mean()); };
+  return channel.name == "gauge" ? planned.noise : planned.noise * swing(channel.value) / swing(run.channel("gauge").value);
+}
+
+/// How far two runs are apart in what is read of the rig: the largest r.m.s. of a channel, over its noise.
+double apart(const Run& with, const Run& without, const Rig& rig, const PlannedRun& planned) {
+  double most = 0;
+  for (const Channel& c : with.channels)
+    if (c.name != "alpha" && is_recorded(c, rig)) most = std::max(most, rms(c.value - without.channel(c.name).value) / noise_of(c, with, planned));
+  return most;
+}
 
 VectorXd white_noise(Index samples, Random& random) {
   std::normal_distribution<double> normal;
@@ -95,12 +95,12 @@ VectorXd own_signals(const Strings& hidden, std::size_t k, const AeroelasticMode
   }
 }
 
-/// What it does to the gauge in one run, r.m.s.
+/// What it does to one run.
 double trace_of(const Alone& effect, const PlannedRun& planned, const VectorXd& signals) {
   SimulateProblem problem = problem_of(effect.with, effect.theta, planned);
   problem.signals = signals;
   const VectorXd theta = effect.theta.head(effect.known.start_values().size());
-  return rms(gauge(problem) - gauge(problem_of(effect.known, theta, planned)));
+  return apart(simulate(problem).run, simulate(problem_of(effect.known, theta, planned)).run, effect.known.rig(), planned);
 }
 
 /// Every mode that half the simulated sampling rate lets through, in the densest fluid, circulation within 1e-6.
@@ -127,21 +127,21 @@ void draw_signals(const std::vector<PlannedRun>& runs, std::vector<SimulateProbl
     const auto signals = static_cast<Index>(problem.model.system(conditions_of(problem.run), problem.theta, {"gauge"}).exogenous.size());
     problem.signals = VectorXd::Zero(signals);
     if (signals == 0) continue;
-    const VectorXd quiet = gauge(problem);
+    const Run quiet = simulate(problem).run;
     problem.signals = white_noise(signals, random);
-    disturbed = std::max(disturbed, rms(gauge(problem) - quiet) / runs[r].noise);
+    disturbed = std::max(disturbed, apart(simulate(problem).run, quiet, problem.model.rig(), runs[r]));
   }
   if (!(disturbed > 0)) return;
-  const double wanted = log_between(random, signal_size.low, signal_size.high);
+  const double wanted = log_between(random, signal_size.first, signal_size.second);
   for (SimulateProblem& problem : problems) problem.signals *= wanted / disturbed;
 }
 
 /// With noise, and whatever else the readings have.
-Run recorded(const Run& fine, const PlannedRun& planned, Random& random) {
+Run recorded(const Run& fine, const PlannedRun& planned, const Rig& rig, Random& random) {
   Run run = every_nth(fine, PlannedRun::finer);
-  std::erase_if(run.channels, [](const Channel& c) { return c.name != "alpha" && c.name != "gauge"; });
+  std::erase_if(run.channels, [&](const Channel& c) { return !is_recorded(c, rig); });
   for (Channel& c : run.channels) {
-    c.value += (c.name == "alpha" ? planned.angle_noise : planned.noise) * white_noise(c.value.size(), random);
+    c.value += noise_of(c, fine, planned) * white_noise(c.value.size(), random);
     if (const Channel* beside = planned.disturbed.find(c.name)) c.value += beside->value;
   }
   return run;
@@ -164,7 +164,7 @@ TrialCampaign draw_campaign(const Rig& rig, const Strings& hidden, const std::ve
   const AeroelasticModel bare = whole_model(whole, runs), model = bare.with_effects(hidden);
   // Of hidden modes the trace is what the truth has beside a rig of one.
   const AeroelasticModel one_mode(whole, make_basis(whole, Index{1}, bare.basis().torsion_modes), bare.circulation());
-  const bool modes_hidden = std::find(hidden.begin(), hidden.end(), "higher-mode") != hidden.end();
+  const bool modes_hidden = std::any_of(hidden.begin(), hidden.end(), [](const std::string& id) { return effect(id).enriches_basis; });
   if (modes_hidden) campaign.rig.normal.modes = 1;
 
   const VectorXd rig_theta = draw_rig(bare, random);
@@ -180,13 +180,13 @@ TrialCampaign draw_campaign(const Rig& rig, const Strings& hidden, const std::ve
   draw_signals(runs, problems, random);
   for (std::size_t r = 0; r < runs.size(); ++r) {
     const Run fine = simulate(problems[r]).run;
-    if (!hidden.empty()) campaign.size = std::max(campaign.size, rms(fine.channel("gauge").value - gauge(problem_of(modes_hidden ? one_mode : bare, rig_theta, runs[r]))) / runs[r].noise);
-    campaign.runs.push_back(recorded(fine, runs[r], random));
+    if (!hidden.empty()) campaign.size = std::max(campaign.size, apart(fine, simulate(problem_of(modes_hidden ? one_mode : bare, rig_theta, runs[r])).run, rig, runs[r]));
+    campaign.runs.push_back(recorded(fine, runs[r], rig, random));
   }
   campaign.sizes.assign(hidden.size(), 0);
   for (std::size_t k = 0; k < hidden.size(); ++k) {
-    const Alone alone = beside_the_rig(hidden[k], hidden[k] == "higher-mode" ? one_mode : bare, bare, model, theta);
-    for (std::size_t r = 0; r < runs.size(); ++r) campaign.sizes[k] = std::max(campaign.sizes[k], trace_of(alone, runs[r], own_signals(hidden, k, bare, problems[r])) / runs[r].noise);
+    const Alone alone = beside_the_rig(hidden[k], effect(hidden[k]).enriches_basis ? one_mode : bare, bare, model, theta);
+    for (std::size_t r = 0; r < runs.size(); ++r) campaign.sizes[k] = std::max(campaign.sizes[k], trace_of(alone, runs[r], own_signals(hidden, k, bare, problems[r])));
   }
   return campaign;
 }

@@ -15,12 +15,12 @@ struct TrialCampaign {
   std::vector<Run> runs;
   std::vector<std::string> hidden;
   std::vector<double> parameters;  ///< of the hidden effects, one after the other
-  double size = 0;                 ///< what they change in the gauge: the largest r.m.s. of a run, over the noise
+  double size = 0;                 ///< what they change: the largest r.m.s. of a channel in a run, over its noise
   std::vector<double> sizes;       ///< the same of each beside the bare rig, in the order of `hidden`
 };
 
-/// Simulates these runs with the effects at work. Stiffness, damping and apparent mass are drawn around the rig file's, the effects' sizes at random over the ranges of
-/// trial_campaign.cpp. The truth has every normal mode, circulation within 1e-6 and a quarter of the recorded step. `rig` has all its modes, unless `higher-mode` is hidden: then it has one.
+/// Simulates these runs with the effects at work. Stiffness, damping and apparent mass are drawn around the rig file's, the effects' sizes as each
+/// of them says (Effect::draw). Sensors of the rig are recorded too, with a noise as small beside their reading as the gauge's. The truth has every normal mode, circulation within 1e-6 and a quarter of the recorded step. `rig` has all its modes, unless `higher-mode` is hidden: then it has one.
 ///
 /// Throws InputError where the rig has no section, gauge or calibration element.
 TrialCampaign draw_campaign(const Rig& rig, const std::vector<std::string>& hidden, const std::vector<PlannedRun>& runs, std::mt19937_64& random);

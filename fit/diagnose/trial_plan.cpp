@@ -7,6 +7,7 @@
 #include <numbers>
 #include <tuple>
 
+#include "core/effects/effect.h"
 #include "core/error.h"
 #include "core/motion.h"
 #include "core/smooth_ramp.h"
@@ -112,7 +113,6 @@ void move_like(const Rig& rig, const Run& recording, PlannedRun& planned) {
 }  // namespace
 
 double between(Random& random, double low, double high) { return std::uniform_real_distribution<double>(low, high)(random); }
-double log_between(Random& random, double low, double high) { return std::exp(between(random, std::log(low), std::log(high))); }
 
 Run every_nth(const Run& fine, Index n) {
   Run run = fine;

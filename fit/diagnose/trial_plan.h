@@ -33,9 +33,8 @@ std::vector<PlannedRun> draw_runs(double noise, std::mt19937_64& random);
 /// Throws InputError for a run that is neither pluck nor step, has no gauge in newtons, or whose shaft never rests: its motion is not told from the noise of its angle.
 std::vector<PlannedRun> runs_like(const Rig& rig, const std::vector<Run>& recordings, std::optional<double> noise, std::mt19937_64& random);
 
-/// Evenly distributed, and evenly in the logarithm.
+/// Evenly distributed.
 double between(std::mt19937_64& random, double low, double high);
-double log_between(std::mt19937_64& random, double low, double high);
 
 /// Every n-th sample.
 Run every_nth(const Run& fine, Eigen::Index n);

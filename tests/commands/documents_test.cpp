@@ -231,7 +231,8 @@ TEST(Documents, TheManualNamesEveryEffectAndItsParameters) {
     EXPECT_EQ(std::count_if(lines.begin(), lines.end(), of_effect), 2) << e.id << ": one row for what it is, one for its equation";
     const auto row = std::find_if(lines.begin(), lines.end(), of_effect);
     if (row == lines.end()) continue;
-    for (const Parameter& p : e.parameters) EXPECT_NE(row->find("`" + p.name + "`"), std::string::npos) << e.id << "." << p.name;
+    for (const std::vector<Parameter>* parameters : {&e.parameters, &e.modal_parameters})
+      for (const Parameter& p : *parameters) EXPECT_NE(row->find("`" + p.name + "`"), std::string::npos) << e.id << "." << p.name;
   }
 }
 

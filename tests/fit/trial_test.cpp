@@ -5,6 +5,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include "core/effects/effect.h"
 #include "core/error.h"
 #include "fit/diagnose/trial_campaign.h"
 #include "tests/support/sample_data.h"
@@ -50,6 +51,28 @@ TEST(TrialCampaign, GivesTheSizeOfEachOfTwo) {
   ASSERT_EQ(modes.sizes.size(), 2u);
   EXPECT_GT(modes.sizes[0], 3) << "the modes that this rig has beside the first";
   EXPECT_LT(modes.sizes[1], 20.01);
+}
+
+/// What a trial hides must be there to be found: `twist-stiffness` and `elastic-coupling` were hidden with a size of 6e-11 and 0, and the sensor that they need was dropped. Traces are r.m.s. over the
+/// noise; rounding leaves some 1e-10 of it.
+TEST(TrialCampaign, EveryEffectOfTheTableLeavesATrace) {
+  Rig rig = read_rig(test::null_campaign("rig.toml"));
+  rig.sensors.push_back({"twist", SensorKind::twist, 14, 1, "rad"});
+  constexpr double trace = 1e-3;
+  for (const Effect& e : effects())
+    for (const unsigned seed : {1U, 2U}) {
+      std::mt19937_64 random(seed);
+      std::vector<PlannedRun> runs = draw_runs(0.03, random);
+      runs.erase(runs.begin() + 2, runs.end() - 1);  // both plucks and the step from 25 degrees
+      const TrialCampaign campaign = draw_campaign(rig, {e.id}, runs, random);
+      ASSERT_EQ(campaign.sizes.size(), 1u) << e.id;
+      EXPECT_GT(campaign.sizes.front(), trace) << e.id;
+      EXPECT_EQ(campaign.parameters.size(), e.parameters.size()) << e.id;
+      for (const unrig::Run& run : campaign.runs) {
+        ASSERT_NE(run.find("twist"), nullptr) << e.id;
+        EXPECT_TRUE(run.find("twist")->value.allFinite()) << e.id;
+      }
+    }
 }
 
 TEST(TrialCampaign, RepeatsRecordings) {

@@ -1,0 +1,309 @@
+// The table of effects: what each makes of the equations of a rig, whatever their sizes. Nothing here knows an effect by its id, but where a law or a limit is its own.
+
+#include "core/effects/effect.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <random>
+
+#include "core/feedback_force.h"
+#include "core/rig.h"
+#include "core/structure.h"
+#include "core/wagner.h"
+#include "tests/support/sample_data.h"
+
+namespace unrig {
+namespace {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+using std::numbers::pi;
+using testing::HasSubstr;
+using testing::IsEmpty;
+
+/// The seed's rig with a sensor of the twist, and one known as two modes.
+Rig beam() {
+  Rig rig = read_rig(test::null_campaign("rig.toml"));
+  rig.normal.modes = 3;
+  rig.sensors.push_back({"twist", SensorKind::twist, 14, 1, "rad"});
+  return rig;
+}
+
+Rig two_modes() {
+  Rig rig;
+  rig.file = "modes.toml";
+  rig.modal = {{2, 3, 0.01, 1000, "N"}, {0.5, 11, 0.02, 700, "N"}};
+  return rig;
+}
+
+AeroelasticModel model_with(const Rig& rig, const std::string& id) {
+  const Basis basis = rig.is_modal() ? Basis{} : make_basis(rig, Index{3}, Index{1});
+  return AeroelasticModel(rig, basis, wagner(Wagner::jones)).with_effects({id});
+}
+
+/// A stalled run in water, so that every effect acts, which records all that can drive it.
+Conditions conditions_for(const Rig& rig) {
+  Conditions c;
+  c.density = 998.2;
+  c.force = c.mount = true;
+  c.nyquist = 250;
+  if (rig.is_modal()) return c;
+  c.speed = 0.6;
+  c.prescribed_pitch = true;
+  c.onset_angle = 0.44;
+  return c;
+}
+
+/// Every effect on every rig that it can act on.
+struct Case {
+  const Effect* effect;
+  Rig rig;
+};
+std::vector<Case> cases() {
+  std::vector<Case> all;
+  for (const Rig& rig : {beam(), two_modes()})
+    for (const Effect& e : effects())
+      if (has(rig, e.needs)) all.push_back({&e, rig});
+  return all;
+}
+
+/// Parameters at which nothing of an effect vanishes: where it is absent half of the product rule would go untested.
+VectorXd at_work(const AeroelasticModel& model, const Effect& e) {
+  std::mt19937_64 random(11);
+  VectorXd theta = model.start_values();
+  const std::vector<Parameter>& own = e.parameters_on(model.rig());
+  auto values = theta.tail(static_cast<Index>(own.size()));
+  if (e.draw && !model.rig().is_modal()) values = e.draw(model, 20, random);
+  for (double& p : values)
+    if (p == 0 || p == 1) p = std::abs(p - 0.3);
+  return theta;
+}
+
+/// Slope of f at 0 by central differences over h and h/2, their errors of second order cancelled (Richardson).
+template <class F>
+auto slope_of(const F& f, double h) {
+  using Value = decltype(f(h));
+  const auto difference = [&](double by) -> Value { return (f(by) - f(-by)) / (2 * by); };
+  const Value coarse = difference(h), fine = difference(h / 2);
+  return Value((4 * fine - coarse) / 3);
+}
+
+constexpr double step = 1e-3;        // of the argument: what Richardson leaves is of its fourth power
+constexpr double relative = 1e-7;    // some thousand times that
+constexpr double round_off = 1e-12;  // of what is differentiated: a hundred times 2^-53, through the solution with the mass matrix
+
+/// Every entry by itself, beside the largest of its row: a norm would hide a small one that is wrong.
+void expect_slope(const MatrixXd& exact, const MatrixXd& slope, const MatrixXd& value, double h, const std::string& what) {
+  ASSERT_TRUE(exact.allFinite()) << what;
+  for (Index i = 0; i < exact.rows(); ++i)
+    for (Index k = 0; k < exact.cols(); ++k) {
+      const double hidden = round_off * value.row(i).cwiseAbs().maxCoeff() / h;
+      EXPECT_NEAR(exact(i, k), slope(i, k), relative * std::abs(slope(i, k)) + hidden) << what << " at " << i << ", " << k;
+    }
+}
+
+TEST(Effects, PartialsOfEveryMatrixAgreeWithSlopes) {
+  for (const auto& [e, rig] : cases()) {
+    const AeroelasticModel model = model_with(rig, e->id);
+    const VectorXd theta = at_work(model, *e);
+    const Conditions conditions = conditions_for(rig);
+    const std::vector<std::string> channels = rig.is_modal() ? std::vector<std::string>{"gauge"} : std::vector<std::string>{"gauge", "twist"};
+    const LinearSystem at = model.system(conditions, theta, channels);
+    struct {
+      const char* name;
+      DualMatrix LinearSystem::*matrix;
+    } const matrices[] = {{"A", &LinearSystem::A}, {"B", &LinearSystem::B}, {"C", &LinearSystem::C}, {"D", &LinearSystem::D}};
+    for (const auto& [name, matrix] : matrices)
+      for (Index j = 0; j < theta.size(); ++j) {
+        const double h = step * (theta[j] == 0 ? 1 : std::abs(theta[j]));
+        const auto value = [&](double by) -> MatrixXd {
+          VectorXd there = theta;
+          there[j] += by;
+          return (model.system(conditions, there, channels).*matrix).value;
+        };
+        const DualMatrix& here = at.*matrix;
+        const MatrixXd slope = slope_of(value, h);
+        const MatrixXd exact = here.depends_on(j) ? here.d(j) : MatrixXd::Zero(slope.rows(), slope.cols());
+        expect_slope(exact, slope, here.value, h, e->id + (rig.is_modal() ? " on modes: " : ": ") + name + " by " + model.parameters()[static_cast<std::size_t>(j)].name);
+      }
+  }
+}
+
+/// Value of a law at (z, p), and its derivatives in each of both.
+struct Point {
+  double value;
+  VectorXd slope;
+};
+Point point_of(const Feedback::Law& law, const VectorXd& z, const VectorXd& p) {
+  Point point{0, VectorXd::Zero(z.size() + p.size())};
+  point.value = law(z.data(), p.data(), point.slope.data(), point.slope.data() + z.size());
+  return point;
+}
+
+void expect_law_slopes(const Feedback::Law& law, const VectorXd& z, const VectorXd& p, const std::string& what) {
+  const Point at = point_of(law, z, p);
+  for (Index k = 0; k < z.size() + p.size(); ++k) {
+    const double here = k < z.size() ? z[k] : p[k - z.size()], h = 1e-5 * std::max(1e-3, std::abs(here));
+    const auto value = [&](double by) {
+      VectorXd there = z, with = p;
+      (k < z.size() ? there[k] : with[k - z.size()]) += by;
+      return point_of(law, there, with).value;
+    };
+    // Rounding of a law is that of the largest term of it, which its slope in any argument times that argument shows as well as its value.
+    const double largest = std::max(std::abs(at.value), std::abs(at.slope[k] * here));
+    EXPECT_NEAR(at.slope[k], slope_of(value, h), relative * std::abs(at.slope[k]) + 1e-14 * largest / h) << what << ", derivative " << k << " at " << z.transpose() << "; " << p.transpose();
+  }
+}
+
+/// Every law (rates of memories are laws too), within and beyond what its own parameters make of a scale, rounded corners included, and in every quadrant of its arguments.
+TEST(Effects, LawsHaveExactDerivativesInEveryArgumentAndParameter) {
+  int laws = 0;
+  for (const auto& [e, rig] : cases()) {
+    const AeroelasticModel model = model_with(rig, e->id);
+    const VectorXd theta = at_work(model, *e);
+    for (const Feedback& f : model.system(conditions_for(rig), theta, {"gauge"}).feedback) {
+      ++laws;
+      const VectorXd p = theta.segment(f.first_parameter, f.parameters);
+      std::vector<double> scales{1e-3, 0.4};
+      for (const double own : p) scales.push_back(std::abs(own));
+      const Index arguments = f.sees.rows();
+      for (const double scale : scales)
+        for (const double part : {0.31, 0.9985, 1.001, 1.7})
+          for (int quadrant = 0; quadrant < (1 << arguments); ++quadrant) {
+            VectorXd z(arguments);
+            for (Index k = 0; k < arguments; ++k) z[k] = ((quadrant >> k) & 1 ? -1 : 1) * part * (k == 0 ? scale : 0.7);
+            expect_law_slopes(f.law, z, p, e->id);
+            if (f.rounded) expect_law_slopes(f.rounded, z, p, e->id + ", rounded");
+          }
+    }
+  }
+  EXPECT_GT(laws, 10) << "otherwise this looks at nothing";
+}
+
+/// The number of states may not depend on theta: searches carry initial states from one theta to the next (a line at 50.05 Hz, sampled at 200 Hz, wrote beyond them). At every corner of
+/// the bounds, at every sampling rate that cuts something off.
+TEST(Effects, AddAsManyStatesWhateverTheirParameters) {
+  for (const auto& [e, rig] : cases())
+    for (const double nyquist : {0.0, 55.0, 100.0, 110.0, 250.0}) {
+      Conditions conditions = conditions_for(rig);
+      conditions.nyquist = nyquist;
+      const AeroelasticModel model = model_with(rig, e->id);
+      const VectorXd usual = at_work(model, *e);
+      const LinearSystem at = model.system(conditions, usual, {"gauge"});
+      const auto own = static_cast<Index>(e->parameters_on(rig).size());
+      for (Index j = usual.size() - own; j < usual.size(); ++j) {
+        const Parameter& p = model.parameters()[static_cast<std::size_t>(j)];
+        for (const double part : {0.0, 0.05, 0.1, 0.5, 1.0}) {
+          VectorXd theta = usual;
+          theta[j] = p.lower + part * (p.upper - p.lower);
+          const LinearSystem there = model.system(conditions, theta, {"gauge"});
+          const std::string what = e->id + ", " + p.name + " = " + std::to_string(theta[j]) + " at " + std::to_string(nyquist);
+          EXPECT_EQ(there.states(), at.states()) << what;
+          EXPECT_EQ(there.exogenous, at.exogenous) << what;
+          EXPECT_EQ(there.settling, at.settling) << what;
+          EXPECT_EQ(there.feedback.size(), at.feedback.size()) << what;
+        }
+      }
+    }
+}
+
+TEST(Effects, HaveAdviceForEveryParameterAndADrawingWithinItsBounds) {
+  const AeroelasticModel bare(beam(), make_basis(beam(), Index{3}, Index{1}), wagner(Wagner::jones));
+  std::mt19937_64 random(5);
+  for (const Effect& e : effects()) {
+    for (const std::vector<Parameter>* parameters : {&e.parameters, &e.modal_parameters})
+      for (const Parameter& p : *parameters) EXPECT_THAT(p.advice, HasSubstr("Record")) << e.id << "." << p.name;
+    if (e.parameters.empty()) continue;
+    ASSERT_TRUE(e.draw) << e.id;
+    for (int draw = 0; draw < 50; ++draw) {
+      const VectorXd p = e.draw(bare, 20, random);
+      ASSERT_EQ(p.size(), static_cast<Index>(e.parameters.size())) << e.id;
+      for (Index k = 0; k < p.size(); ++k) {
+        EXPECT_GE(p[k], e.parameters[static_cast<std::size_t>(k)].lower) << e.id << " " << k;
+        EXPECT_LE(p[k], e.parameters[static_cast<std::size_t>(k)].upper) << e.id << " " << k;
+      }
+    }
+  }
+}
+
+/// Frequencies [Hz] that the gauge reads of the hum, for a fundamental.
+std::vector<double> heard(double fundamental, double nyquist) {
+  const AeroelasticModel model = model_with(two_modes(), "mains-hum");
+  Conditions conditions = conditions_for(two_modes());
+  conditions.nyquist = nyquist;
+  VectorXd theta = model.start_values();
+  theta[model.index("mains-hum.frequency")] = fundamental;
+  const LinearSystem system = model.system(conditions, theta, {"gauge"});
+  std::vector<double> frequencies;
+  for (const Index i : system.exogenous)
+    if (system.C.value(0, i) != 0) frequencies.push_back(system.A.value.row(i).cwiseAbs().maxCoeff() / (2 * pi));
+  return frequencies;
+}
+
+TEST(Effects, HumAboveTheNyquistFrequencyIsNotHeard) {
+  for (double nyquist = 51; nyquist < 200; nyquist += 1.7)
+    for (const double f : {49.5, 50.0, 50.5, 59.4, 60.0, 60.6})
+      for (const double heard_at : heard(f, nyquist)) EXPECT_LT(heard_at, nyquist) << f;
+  EXPECT_EQ(heard(50, 100).size(), 1u) << "100 Hz may be beyond";
+  EXPECT_EQ(heard(50, 110).size(), 2u);
+  EXPECT_EQ(heard(60, 110).size(), 1u);
+  EXPECT_EQ(heard(60, 125).size(), 2u);
+  EXPECT_EQ(heard(60, 55).size(), 0u);
+  EXPECT_EQ(heard(50, 250).size(), 3u);
+  EXPECT_FALSE(effect("mains-hum").acts(two_modes(), [] { Conditions c; c.nyquist = 50; return c; }()));
+}
+
+TEST(Effects, MainsAreFiftyOrSixtyHertz) {
+  const AeroelasticModel model = model_with(two_modes(), "mains-hum");
+  const Index frequency = model.index("mains-hum.frequency");
+  for (const double value : {50.2, 47.0}) EXPECT_EQ(bounds_at(model, frequency, value), Effect::Band(49.5, 50.5)) << value;
+  for (const double value : {59.9, 58.0, 63.0}) EXPECT_EQ(bounds_at(model, frequency, value), Effect::Band(59.4, 60.6)) << value;
+  const Parameter& mass = model.parameters().front();
+  EXPECT_EQ(bounds_at(model, 0, mass.start), Effect::Band(mass.lower, mass.upper));
+}
+
+/// Section stall: both act from 8 degrees on (Leishman and Beddoes; Fage and Johansen).
+TEST(Effects, SeparationBeginsAtEightDegrees) {
+  for (const char* id : {"separation-lag", "vortex-shedding"}) {
+    Conditions c = conditions_for(beam());
+    for (const double degrees : {1.0, 7.9, -7.9}) {
+      c.onset_angle = degrees * pi / 180;
+      EXPECT_FALSE(effect(id).acts(beam(), c)) << id << " " << degrees;
+      const AeroelasticModel model = model_with(beam(), id), bare(beam(), model.basis(), model.circulation());
+      EXPECT_EQ(model.system(c, model.start_values(), {"gauge"}).states(), bare.system(c, bare.start_values(), {"gauge"}).states()) << id;
+    }
+    for (const double degrees : {8.1, 25.0, -8.1}) {
+      c.onset_angle = degrees * pi / 180;
+      EXPECT_TRUE(effect(id).acts(beam(), c)) << id << " " << degrees;
+    }
+  }
+}
+
+TEST(Effects, SayWhyTheyCannotAct) {
+  Conditions still;  // in no fluid at all
+  EXPECT_THAT(why_idle(effect("quadratic-drag"), beam(), {still}), HasSubstr("cubic-damping"));
+  EXPECT_THAT(why_idle(effect("quadratic-drag"), two_modes(), {still}), IsEmpty()) << "there its coefficient is a force over velocity squared";
+  Conditions air;
+  air.density = 1.2;
+  EXPECT_THAT(why_idle(effect("quadratic-drag"), beam(), {still, air}), IsEmpty());
+  EXPECT_THAT(why_idle(effect("wagner-lag"), beam(), {air}), HasSubstr("stream"));
+  EXPECT_THAT(why_idle(effect("wagner-lag"), two_modes(), {air}), HasSubstr("modes"));
+  EXPECT_THAT(why_idle(effect("twist-stiffness"), read_rig(test::null_campaign("rig.toml")), {air}), HasSubstr("[[sensor]]"));
+  Rig whole = beam();
+  whole.normal.modes = 0;
+  EXPECT_THAT(why_idle(effect("higher-mode"), whole, {air}), HasSubstr("leaves modes out"));
+  for (const auto& [e, rig] : cases()) EXPECT_THAT(why_idle(*e, rig, {conditions_for(rig)}), IsEmpty()) << "otherwise the tests of this file look at less than they say";
+}
+
+TEST(Effects, UnknownIdsAreRefused) {
+  EXPECT_THROW(effect("tank-waves"), std::invalid_argument);
+  for (const Effect& e : effects()) EXPECT_EQ(effect(e.id).id, e.id);
+}
+
+}  // namespace
+}  // namespace unrig
