@@ -7,6 +7,8 @@
 #include <Eigen/QR>
 #include <cmath>
 #include <memory>
+#include <utility>
+#include <vector>
 
 #include "tests/fit/one_mode.h"
 
@@ -37,9 +39,15 @@ struct Campaign {
   Arrival arrival;
 
   /// The fit stands at the rig's own values, which are the truth of all decays but the stiffer ones.
-  explicit Campaign(std::vector<unrig::Run> runs) : problem{one_mode::rig(), std::move(runs)}, arrival(arrival_of(problem)) {}
+  explicit Campaign(std::vector<unrig::Run> runs) : problem(problem_of(std::move(runs))), arrival(arrival_of(problem)) {}
 
  private:
+  static FitProblem problem_of(std::vector<unrig::Run> runs) {
+    FitProblem problem;
+    problem.rig = one_mode::rig();
+    problem.runs = std::move(runs);
+    return problem;
+  }
   static Arrival arrival_of(const FitProblem& problem) {
     const auto model = std::make_shared<const AeroelasticModel>(one_mode::model());
     std::vector<RunResidual> residuals;
