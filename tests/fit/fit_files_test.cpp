@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <filesystem>
+#include <tuple>
 
 #include <nlohmann/json.hpp>
 
@@ -52,6 +53,33 @@ TEST(FitFiles, ARunThatWasNotFittedTakesTheSlopeOfTheRunNearestInAngle) {
   EXPECT_EQ(slope(22), own(2)) << "in stall";
   fitted.onset_angles.clear();
   EXPECT_NEAR(slope(22), (own(0) + own(1) + own(2)) / 3, 1e-12) << "of an earlier version";
+}
+
+/// Three runs of one model, each with a slope of its own; a fourth run that began at 22 degrees was not fitted.
+TEST(FitFiles, EveryRunHasItsOwnSlope) {
+  const Rig rig = read_rig(test::null_campaign("rig.toml"));
+  const AeroelasticModel model(rig, make_basis(rig, Eigen::Index{1}, Eigen::Index{1}), wagner(Wagner::jones));
+  FittedRig fit;
+  fit.file = "fit.json";
+  constexpr double degree = 3.14159265358979 / 180;
+  for (const auto& [run, onset, slope] : {std::tuple{"a.csv", 2.0, 5.9}, std::tuple{"b.csv", 4.0, 5.5}, std::tuple{"c.csv", 25.0, 3.6}}) {
+    fit.runs.push_back(run);
+    fit.onset_angles.push_back(onset * degree);
+    fit.parameters.emplace_back();
+    fit.parameters.back().name = "normal_force_slope";
+    fit.parameters.back().run = run;
+    fit.parameters.back().value = slope;
+  }
+  const auto slope_for = [&](const std::string& run, double degrees) { return theta_for(model, fit, run, degrees * degree)[model.index("normal_force_slope")]; };
+  EXPECT_EQ(slope_for("a.csv", 2), 5.9);
+  EXPECT_EQ(slope_for("b.csv", 4), 5.5);
+  EXPECT_EQ(slope_for("c.csv", 25), 3.6);
+  EXPECT_EQ(slope_for("b.csv", 24), 5.5) << "its own, wherever it is said to begin";
+  EXPECT_EQ(slope_for("d.csv", 22), 3.6) << "that of the run nearest in angle";
+  EXPECT_EQ(slope_for("d.csv", 3.1), 5.5);
+  EXPECT_EQ(slope_for("d.csv", 1), 5.9);
+  EXPECT_EQ(fit.value("normal_force_slope", "c.csv", 0), 3.6);
+  EXPECT_EQ(fit.value("normal_force_slope", "d.csv", -1), -1) << "it has none";
 }
 
 TEST(FitFiles, ARecordingIsKnownByItsFileAndByItsNameOnlyWhereThatIsGone) {

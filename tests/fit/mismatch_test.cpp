@@ -2,8 +2,103 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <cmath>
+#include <deque>
+#include <string>
+#include <vector>
+
+#include "tests/fit/one_mode.h"
+
 namespace unrig {
 namespace {
+
+using Eigen::Index;
+using Eigen::VectorXd;
+
+/// Decays of the rig with this beside them, at the rig's true values.
+struct AtTheTruth {
+  AeroelasticModel model = one_mode::model();
+  std::deque<unrig::Run> runs;
+  std::vector<RunResidual> residuals;
+
+  void add(const VectorXd& beside) {
+    runs.push_back(one_mode::decay("decay_" + std::to_string(runs.size() + 1) + ".csv", 3 * one_mode::free_response(beside.size(), one_mode::hertz).col(0) + beside));
+    residuals.emplace_back(model, runs.back(), std::vector<MotionBasis::Window>{});
+  }
+  Mismatch mismatch() const { return locate_mismatch(JointProblem(model, residuals)); }
+};
+
+/// What a model that leaves out a tone of this amplitude is left with, in units of the noise.
+VectorXd with_tone(Index samples, double amplitude, unsigned seed) { return 0.01 * (one_mode::white_noise(samples, seed) + amplitude * one_mode::tone(samples, 20)); }
+
+Mismatch of_tone(Index samples, double amplitude) {
+  AtTheTruth t;
+  t.add(with_tone(samples, amplitude, 7));
+  return t.mismatch();
+}
+
+/// The amplitude with which the tone in a single run is as unlikely as this.
+double amplitude_of(double p_value, Index samples) {
+  double low = 0, high = 2;
+  for (int halving = 0; halving < 25; ++halving) {
+    const double middle = (low + high) / 2;
+    (of_tone(samples, middle).p_value > p_value ? low : high) = middle;
+  }
+  return high;
+}
+
+constexpr Index some = 500;
+
+TEST(Mismatch, IsFoundWhereNoiseLeavesAsMuchOnceInAThousandTimes) {
+  const Mismatch chance = of_tone(some, amplitude_of(3e-3, some)), found = of_tone(some, amplitude_of(3e-4, some));
+  ASSERT_NEAR(chance.p_value, 3e-3, 1e-4);
+  ASSERT_NEAR(found.p_value, 3e-4, 1e-5);
+  ASSERT_GT(chance.channels.front().energy, 1.06) << "otherwise it is the motion's share that excuses it";
+  EXPECT_FALSE(chance.found);
+  EXPECT_TRUE(found.found);
+}
+
+TEST(Mismatch, OneChannelOfManyMustBeAsManyTimesLessLikely) {
+  AtTheTruth alone, among_others;
+  const VectorXd beside = with_tone(some, amplitude_of(2e-4, some), 7);
+  alone.add(beside);
+  ASSERT_TRUE(alone.mismatch().found);
+  among_others.add(beside);
+  for (unsigned i = 1; i < 20; ++i) among_others.add(with_tone(some, 0, 100 + i));
+  const Mismatch m = among_others.mismatch();
+  double least = 1;
+  for (const ChannelMismatch& channel : m.channels) least = std::min(least, channel.p_value);
+  ASSERT_NEAR(least, 2e-4, 1e-5) << "noise alone is less likely in one of the others";
+  EXPECT_NEAR(m.p_value, 20 * least, 1e-12);
+  EXPECT_FALSE(m.found) << "one in 250 campaigns of twenty runs looks so";
+}
+
+/// Forty thousand samples show a fortieth of the noise's power without any doubt; a motion that is known to its noise leaves up to a twentieth.
+TEST(Mismatch, IsNoneWithinATwentiethOfTheNoise) {
+  constexpr Index many = 40000;
+  const Mismatch little = of_tone(many, std::sqrt(2 * 0.025)), more = of_tone(many, std::sqrt(2 * 0.08));
+  ASSERT_NEAR(little.channels.front().energy, 1.025, 0.015);  // a hundredth is how well so many samples tell the noise and what is left
+  ASSERT_NEAR(more.channels.front().energy, 1.08, 0.015);
+  EXPECT_LT(little.p_value, 1e-6);
+  EXPECT_FALSE(little.found);
+  EXPECT_TRUE(more.found);
+}
+
+/// The same for what is left white, which has no colour to be seen by: noise that is larger than it is said to be.
+TEST(Mismatch, PowerIsHeldAgainstTheNoiseAndATwentieth) {
+  constexpr Index many = 40000;
+  const AeroelasticModel model = one_mode::model();
+  const unrig::Run quiet = one_mode::decay("quiet.csv", with_tone(many, 0, 3));
+  const auto p_value = [&](double power) {
+    const unrig::Run loud = one_mode::decay("loud.csv", std::sqrt(power) * quiet.channels.front().value);
+    std::vector<RunResidual> residuals{{model, loud, {}}};
+    residuals.front().keep_noise_of(RunResidual(model, quiet, {}));
+    return locate_mismatch(JointProblem(model, residuals)).p_value;
+  };
+  EXPECT_GT(p_value(1.03), 0.01) << "four standard deviations above the noise itself";
+  EXPECT_LT(p_value(1.10), 1e-3);
+}
 
 TEST(Mismatch, NamesPowersAsOneSaysThem) {
   EXPECT_EQ(in_words_of_power(1.04), "in proportion to");
