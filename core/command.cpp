@@ -1,8 +1,10 @@
 #include "core/command.h"
+#include "core/last_progress.h"
 
 #include <unistd.h>
 
 #include <cstdio>
+#include <set>
 
 namespace unrig {
 
@@ -10,6 +12,7 @@ namespace {
 
 void erase_line() { std::fputs("\r\033[K", stderr); }
 
+std::string last_told;
 bool line_shown = false;  // a warning must not begin at the end of it
 
 }  // namespace
@@ -17,6 +20,7 @@ bool line_shown = false;  // a warning must not begin at the end of it
 Progress::Progress() : terminal_(isatty(STDERR_FILENO) == 1) {}
 
 void Progress::operator()(const std::string& what) {
+  last_told = what;
   if (!terminal_) return;
   std::fprintf(stderr, "\r\033[K%s ...", what.c_str());
   std::fflush(stderr);
@@ -28,7 +32,11 @@ void Progress::clear() {
   shown_ = line_shown = false;
 }
 
+const std::string& last_progress() { return last_told; }
+
 void warn(const std::string& warning) {
+  static std::set<std::string> said;  // each once per call of the program
+  if (!said.insert(warning).second) return;
   if (line_shown) erase_line();
   line_shown = false;
   std::fprintf(stderr, "warning: %s\n", warning.c_str());

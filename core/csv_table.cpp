@@ -5,8 +5,10 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <unordered_set>
 
 #include "core/scan.h"
+#include "core/text_kind.h"
 
 namespace unrig {
 namespace {
@@ -35,8 +37,9 @@ CsvColumn header_cell(std::string_view cell, const InputError::Place& place) {
   cell = trimmed(cell);
   if (cell.size() >= 2 && cell.front() == '"' && cell.back() == '"') cell = trimmed(cell.substr(1, cell.size() - 2));
   CsvColumn column;
-  const auto bracket = cell.rfind('[');
-  const bool has_unit = bracket != std::string_view::npos && cell.ends_with(']');
+  // "gauge [N]", or "gauge (N)" as spreadsheets have it.
+  const auto bracket = cell.ends_with(']') ? cell.rfind('[') : cell.ends_with(')') ? cell.rfind('(') : std::string_view::npos;
+  const bool has_unit = bracket != std::string_view::npos;
   column.name = trimmed(cell.substr(0, has_unit ? bracket : cell.size()));
   if (has_unit) column.unit = trimmed(cell.substr(bracket + 1, cell.size() - bracket - 2));
   if (column.name.empty()) throw InputError(place, "the header has a column without a name", "wanted `name [unit]` for every column", "");
@@ -51,13 +54,13 @@ void check_header(const CsvTable& table, std::string_view line) {
                      "wanted the header row `name [unit],...` above the numbers", "Write for instance \"time [s],alpha [deg],gauge [N]\".");
   }
   if (table.columns.size() == 1 && line.find_first_of(";\t") != std::string_view::npos) {
-    throw InputError(place, "the columns are separated by semicolons or tabs", "wanted commas between columns and a point in numbers", "");
+    throw InputError(place, "the columns are separated by semicolons or tabs", "wanted commas between columns and a point in numbers",
+                     "`unrig import` reads such a table and makes a run file of it.");
   }
-  for (std::size_t k = 0; k < table.columns.size(); ++k) {
-    const std::string& name = table.columns[k].name;
-    const auto same = [&name](const CsvColumn& column) { return column.name == name; };
-    if (std::count_if(table.columns.begin(), table.columns.end(), same) > 1) {
-      throw InputError(place, fmt::format("the header names the column \"{}\" more than once", name), "wanted every name once", "");
+  std::unordered_set<std::string_view> names;  // a file of another kind may have 100 000 columns
+  for (const CsvColumn& column : table.columns) {
+    if (!names.insert(column.name).second) {
+      throw InputError(place, fmt::format("the header names the column \"{}\" more than once", column.name), "wanted every name once", "");
     }
   }
 }
@@ -79,22 +82,27 @@ void note_odd_cell(std::string_view cell, int line, CsvColumn& column) {
   if (cell.empty()) {
     ++column.missing;
   } else if (column.text.empty()) {
-    column.text = cell.substr(0, 40);
+    column.text = printable(cell.substr(0, 40));
     column.text_line = line;
   }
 }
 
-/// Reads one cell and returns where it ends.
-const char* read_cell(const char* at, const char* end, int line, double& value, CsvColumn& column) {
+/// Reads one cell, with or without quotes around it, and returns where it ends.
+const char* read_cell(const char* at, const char* end, int line, double& value, CsvColumn& column, bool is_in_quotes = false) {
   at = skip_blanks(at, end);
   const char* stop = read_number(at, end, value);
   const bool numeric = stop != at;
   if (numeric) stop = skip_blanks(stop, end);
-  const bool whole = numeric && (stop == end || *stop == ',');
+  const bool whole = numeric && (stop == end || (*stop == ',' && !is_in_quotes));
   if (whole && std::isfinite(value)) return stop;
   const bool nan = whole && std::isnan(value);
-  if (!whole) stop = cell_end(at, end);
-  note_odd_cell(nan ? std::string_view{} : trimmed({at, stop}), line, column);
+  if (!whole) stop = is_in_quotes ? end : cell_end(at, end);
+  const std::string_view cell = trimmed({at, stop});
+  if (cell.size() >= 2 && cell.front() == '"' && cell.back() == '"' && !is_in_quotes) {
+    read_cell(cell.data() + 1, cell.data() + cell.size() - 1, line, value, column, true);
+    return stop;
+  }
+  note_odd_cell(nan ? std::string_view{} : cell, line, column);
   value = std::numeric_limits<double>::quiet_NaN();
   return stop;
 }
@@ -125,7 +133,11 @@ std::size_t read_row(std::string_view text, int line, Eigen::Index row, std::vec
 
 CsvTable read_csv(std::string_view text, int header_line, const std::string& file) {
   CsvTable table{file, header_line, {}};
-  read_header(take_line(text), table);
+  std::string converted;
+  if (ends_lines_with_returns(text)) text = converted = with_line_feeds(text);
+  const std::string_view header = take_line(text);
+  require_utf8(header, file, header_line);
+  read_header(header, table);
 
   const Eigen::Index most = std::count(text.begin(), text.end(), '\n') + 1;
   for (CsvColumn& column : table.columns) column.value.resize(most);

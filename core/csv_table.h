@@ -12,7 +12,7 @@ namespace unrig {
 /// One column as it stands in the file.
 struct CsvColumn {
   std::string name;
-  std::string unit;         ///< between the brackets of the header; empty where there are none
+  std::string unit;         ///< between the brackets or parentheses of the header; empty where there are none
   Eigen::VectorXd value;    ///< in the file's unit; NaN where the cell holds no number
   std::size_t missing = 0;  ///< empty and nan cells
   std::string text;         ///< the first cell that holds neither a finite number nor nothing; empty where there is none
@@ -32,9 +32,9 @@ struct CsvTable {
 
 /// Reads header and rows from `text`, which begins at `header_line` of `file`. About 2e7 numbers per second.
 ///
-/// CR LF line ends, spaces around cells, a missing last line end and blank lines at the end are accepted. A cell that is empty or "nan" is
-/// missing. Throws InputError, with the line, for a header that is absent, has an unnamed or repeated column or another separator, for rows
-/// with too few or too many cells, and for a file that ends in the middle of a row.
+/// Line ends of LF, CR LF, or CR alone, spaces and quotes around cells, a missing last line end and blank lines at the end are accepted. A cell
+/// that is empty or "nan" is missing. Throws InputError, with the line, for a header that is absent, has an unnamed or repeated column or another separator, for rows
+/// with too few or too many cells, a header that is no UTF-8, and a file that ends in the middle of a row.
 CsvTable read_csv(std::string_view text, int header_line, const std::string& file);
 
 }  // namespace unrig

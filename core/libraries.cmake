@@ -10,7 +10,7 @@ find_dependency(FastFloat)
 find_dependency(ZLIB)
 find_dependency(PkgConfig)
 pkg_check_modules(FFTW3 REQUIRED IMPORTED_TARGET fftw3)
-pkg_check_modules(MATIO REQUIRED IMPORTED_TARGET matio)
+pkg_check_modules(HDF5 REQUIRED IMPORTED_TARGET hdf5)
 if(NOT TARGET UDUNITS2::UDUNITS2)  # its .pc file goes by different names
   find_path(UDUNITS2_INCLUDE_DIR udunits2.h PATH_SUFFIXES udunits2 REQUIRED)
   find_library(UDUNITS2_LIBRARY udunits2 REQUIRED)

@@ -10,6 +10,7 @@
 #include "core/rig_chain.h"
 #include "core/rig_gauge.h"
 #include "core/text_file.h"
+#include "core/text_kind.h"
 #include "core/toml_table.h"
 #include "core/units.h"
 
@@ -213,7 +214,9 @@ void take_modes(const TomlTable& file, Rig& rig) {
 }  // namespace
 
 Rig read_rig(const std::string& path) {
-  const TomlTable file = TomlTable::parse(read_text(path), path, "Text stands in double quotes, a remark begins with #.");
+  const std::string text = read_text(path);
+  refuse_other_kinds(text, path, TextKind::rig);
+  const TomlTable file = TomlTable::parse(text, path, "Text stands in double quotes, a remark begins with #.");
   check_rig_version(file, path);
   Rig rig;
   rig.file = path;

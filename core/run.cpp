@@ -6,11 +6,14 @@
 #include <algorithm>
 #include <array>
 #include <filesystem>
+#include <map>
 #include <optional>
 #include <utility>
 
 #include "core/csv_table.h"
+#include "core/run_limits.h"
 #include "core/text_file.h"
+#include "core/text_kind.h"
 #include "core/time_grid.h"
 #include "core/toml_table.h"
 #include "core/units.h"
@@ -48,11 +51,8 @@ struct Split {
   std::string_view table;
 };
 
-Split split(std::string_view text, const std::string& path) {
+Split split(std::string_view text) {
   if (text.starts_with("\xEF\xBB\xBF")) text.remove_prefix(3);
-  if (text.starts_with("\xFF\xFE") || text.starts_with("\xFE\xFF")) {
-    throw InputError({path, 1}, "the file is in UTF-16", "wanted UTF-8 or ASCII text", "Save it again as \"CSV UTF-8\".");
-  }
   Split parts;
   while (!text.empty()) {
     const std::size_t end = text.find('\n');
@@ -118,6 +118,7 @@ Run read_meta_data(const TomlTable& meta, const std::string& path) {
   run.medium = meta.text_or("medium", "");
   run.density = not_negative(meta, "density", "kg/m^3");
   run.speed = not_negative(meta, "speed", "m/s");
+  check_conditions(meta, run);
   return run;
 }
 
@@ -242,8 +243,12 @@ void take_times(const TimeGrid& grid, const UnitScale& seconds, Run& run) {
   run.largest_jitter = seconds.factor * grid.largest_jitter;
   run.resampled = grid.resample;
   if (!grid.spread_lines.empty()) {
-    run.warnings.push_back(fmt::format("{}:{}: {} time stamp(s) repeat the one before; they are spread over the late interval before them",
+    run.warnings.push_back(fmt::format("{}:{}: {} time stamp(s) repeat the one before; they are spread over the long interval beside them",
                                        run.file, grid.spread_lines.front(), grid.spread_lines.size()));
+  }
+  if (!grid.repeated_lines.empty()) {
+    run.warnings.push_back(fmt::format("{}:{}: {} row(s) repeat the time of the row before, with no sample missing beside them, and are left out",
+                                       run.file, grid.repeated_lines.front(), grid.repeated_lines.size()));
   }
   if (grid.resample) {
     run.warnings.push_back(
@@ -254,6 +259,7 @@ void take_times(const TimeGrid& grid, const UnitScale& seconds, Run& run) {
 
 Channel make_channel(CsvColumn& column, const ColumnScale& to, const TimeGrid& grid) {
   Channel channel{column.name, column.unit, to.unit, to.scale.factor, std::move(column.value), column.missing};
+  if (!grid.rows.empty()) channel.value = Eigen::VectorXd(channel.value(grid.rows));
   if (grid.resample) channel.value = column.name == "weight" ? interpolated_weight(channel.value, grid) : interpolated(channel.value, grid);
   channel.value = (channel.value.array() * to.scale.factor + to.scale.offset).matrix();
   return channel;
@@ -263,8 +269,11 @@ void take_columns(CsvTable& table, const Calibrations& calibrations, Run& run) {
   check_columns(table);
   const auto time = std::find_if(table.columns.begin(), table.columns.end(), [](const CsvColumn& column) { return column.name == "time"; });
   const UnitScale seconds = scale_of(*time, table, calibrations, run).scale;
+  check_times(table, *time, seconds);
   const TimeGrid grid = time_grid(table, *time);
   take_times(grid, seconds, run);
+  check_step(table, run.dt);
+  std::map<std::string, ColumnScale> scales;  // of columns without a meaning, by their unit: there may be 100 000 of them
   for (CsvColumn& column : table.columns) {
     if (column.name == "time") continue;
     if (!column.text.empty()) {
@@ -273,7 +282,16 @@ void take_columns(CsvTable& table, const Calibrations& calibrations, Run& run) {
       continue;
     }
     if (column.name == "weight") check_weight(table, column);
-    const ColumnScale scale = scale_of(column, table, calibrations, run);
+    const auto known_scale = scales.find(column.unit);
+    const ColumnScale scale = known_scale != scales.end() && !known(column.name) ? known_scale->second : scale_of(column, table, calibrations, run);
+    if (!known(column.name)) scales.emplace(column.unit, scale);
+    try {
+      check_readings(table, column, scale.scale, scale.unit);
+    } catch (const InputError& error) {
+      if (known(column.name)) throw;
+      run.warnings.push_back(fmt::format("{} It is left out.", error.what()));
+      continue;
+    }
     run.channels.push_back(make_channel(column, scale, grid));
   }
   if (run.channels.empty()) {
@@ -309,7 +327,10 @@ const Channel& Run::channel(std::string_view column) const {
 Run read_run(const std::string& path) { return parse_run(read_text(path), path); }
 
 Run parse_run(std::string_view text, const std::string& path) {
-  const Split parts = split(text, path);
+  refuse_other_kinds(text, path, TextKind::run);
+  std::string converted;
+  if (ends_lines_with_returns(text)) text = converted = with_line_feeds(text);
+  const Split parts = split(text);
   const TomlTable meta =
       TomlTable::parse(parts.meta_data, path, "Text stands in double quotes; a remark among the meta data begins with `# #`.");
   Run run = read_meta_data(meta, path);

@@ -5,6 +5,7 @@
 #include <fmt/format.h>
 
 #include "core/aeroelastic_model.h"
+#include "core/column_names.h"
 #include "core/error.h"
 #include "core/units.h"
 
@@ -13,15 +14,24 @@ namespace {
 
 using Eigen::VectorXd;
 
+/// "; there is a column "Alpha"", where one may have been meant for the column that is missing.
+std::string meant_for(const Run& run, const std::string& column) {
+  std::vector<std::string> present;
+  for (const Channel& channel : run.channels) present.push_back(channel.name);
+  for (const std::string& name : present)
+    if (meant_column(name, present) == column) return fmt::format("; there is a column \"{}\"", name);
+  return "";
+}
+
 /// A run must have what its kind says drives the rig, and the rig must be able to answer to it.
 void check_kind(const Run& run, const Rig& rig) {
   const auto refuse = [&](const std::string& found, const std::string& wanted) { throw InputError({run.file, run.header_line}, found, wanted, ""); };
   if (run.kind == RunKind::step && rig.is_modal())
     refuse("the run is a step of the angle", "wanted a pluck, a forced or a moved run: the rig " + rig.file + " is known only as modes, and has no section");
-  if (run.kind == RunKind::step && !run.find("alpha")) refuse("a step without a column \"alpha\"", "wanted the measured angle");
-  if (run.kind == RunKind::forced && !run.find("force")) refuse("a forced run without a column \"force\"", "wanted the measured force");
+  if (run.kind == RunKind::step && !run.find("alpha")) refuse("a step without a column \"alpha\"" + meant_for(run, "alpha"), "wanted the measured angle");
+  if (run.kind == RunKind::forced && !run.find("force")) refuse("a forced run without a column \"force\"" + meant_for(run, "force"), "wanted the measured force");
   if (run.kind == RunKind::moved && !run.find("mount_velocity") && !run.find("mount_acceleration"))
-    refuse("a moved run without a column \"mount_velocity\" or \"mount_acceleration\"", "wanted the measured motion of the mount");
+    refuse("a moved run without a column \"mount_velocity\" or \"mount_acceleration\"" + meant_for(run, "mount_velocity") + meant_for(run, "mount_acceleration"), "wanted the measured motion of the mount");
 }
 
 /// The gauge must read what the rig's gauge reads. Volts and counts will do for a free decay, whose amplitude is free.
@@ -83,7 +93,7 @@ std::vector<std::string> AeroelasticModel::output_channels(const Run& run) const
     wanted += (wanted.empty() ? "a column '" : " or '") + sensor.column + "'";
   }
   if (channels.empty())
-    throw InputError({run.file, run.header_line}, "none of the columns belongs to this rig (" + rig_.file + ")", "wanted " + (wanted.empty() ? "a gauge or a sensor in the rig file" : wanted),
+    throw InputError({run.file, run.header_line}, "none of the columns belongs to this rig (" + rig_.file + ")" + meant_for(run, "gauge"), "wanted " + (wanted.empty() ? "a gauge or a sensor in the rig file" : wanted),
                      "Give the rig file of this run, or add the gauge or [[sensor]] to it.");
   if (channels.front() == "gauge") check_gauge_unit(run, rig_);
   return channels;

@@ -9,6 +9,8 @@
 #include <cerrno>
 #include <cstring>
 #include <filesystem>
+#include <limits>
+#include <new>
 #include <optional>
 #include <string_view>
 #include <system_error>
@@ -170,7 +172,18 @@ void flush_directory(const fs::path& directory) {
 
 }  // namespace
 
-std::string read_text(const std::string& path) {
+namespace {
+
+/// How much a path may give that is no regular file: some never end. A device that is no terminal holds no text at all, but /dev/null has an end.
+std::size_t most_bytes(const struct stat& found, int file) {
+  constexpr std::size_t of_device = 1 << 16, of_pipe = std::size_t{1} << 30;  // 30 million samples
+  if (S_ISREG(found.st_mode)) return std::numeric_limits<std::size_t>::max();
+  return (S_ISCHR(found.st_mode) || S_ISBLK(found.st_mode)) && ::isatty(file) == 0 ? of_device : of_pipe;
+}
+
+}  // namespace
+
+std::string read_text(const std::string& path) try {
   const auto refuse = [&path](const std::string& why) {
     throw InputError({path, 0}, "the file cannot be read: " + why, "wanted a readable text file", "");
   };
@@ -189,9 +202,12 @@ std::string read_text(const std::string& path) {
     if (got < 0) refuse(reason());
     if (got == 0) break;
     size += static_cast<std::size_t>(got);
+    if (found && size > most_bytes(*found, file.number())) refuse(fmt::format("no end of it after {} kB", size >> 10));
   }
   text.resize(size);
   return text;
+} catch (const std::bad_alloc&) {
+  throw InputError({path, 0}, "the file cannot be read: it is larger than the memory", "wanted a readable text file", "");
 }
 
 std::string whole_text(const TextSource& text) {

@@ -46,26 +46,85 @@ void check_stamps(const CsvTable& table, const CsvColumn& time) {
   }
 }
 
-/// Spreads runs of equal stamps over the interval before them, and returns the lines of the file where it did so.
-std::vector<int> spread_repeated(const CsvTable& table, const CsvColumn& time, VectorXd& stamps) {
-  std::vector<int> lines;
-  if (std::adjacent_find(stamps.begin(), stamps.end()) == stamps.end()) return lines;
-  const double step = median(intervals(stamps));
-  for (Index first = 0; first < stamps.size(); ++first) {
-    Index last = first;
-    while (last + 1 < stamps.size() && stamps[last + 1] == stamps[first]) ++last;
-    if (last == first) continue;
-    const double since = first > 0 ? stamps[first] - stamps[first - 1] : 0;
+/// The stamps that are judged, and the rows of the table that they stand in.
+struct Stamps {
+  const CsvTable& table;
+  VectorXd value;
+  std::vector<Index> row;  ///< empty: every row
+  InputError::Place place(Index k) const { return table.place(row.empty() ? k : row[static_cast<std::size_t>(k)]); }
+};
+
+bool same_readings(const CsvTable& table, Index a, Index b) {
+  return std::all_of(table.columns.begin(), table.columns.end(), [&](const CsvColumn& column) {
+    const double x = column.value[a], y = column.value[b];
+    return x == y || (std::isnan(x) && std::isnan(y));
+  });
+}
+
+/// Runs of equal stamps: spread where there is time for their samples, left out where there is none (core/time_grid.h).
+class RepeatedStamps {
+ public:
+  RepeatedStamps(const CsvTable& table, const CsvColumn& time)
+      : table_(table), time_(time), stamps_(time.value), extra_(static_cast<std::size_t>(time.value.size()), false) {
+    const VectorXd interval = intervals(stamps_);
+    // Gaps lengthen the mean, repeated stamps shorten it.
+    const double typical = median(interval);
+    step_ = typical > 0 ? std::min(typical, interval.mean()) : 0;
+    fine_ = 2 * last_digit(stamps_) <= step_;
+  }
+
+  Stamps treated(TimeGrid& grid) {
+    for (Index first = 0; first < stamps_.size(); ++first) {
+      Index last = first;
+      while (last + 1 < stamps_.size() && stamps_[last + 1] == stamps_[first]) ++last;
+      if (last > first) treat(first, last, grid);
+      first = last;
+    }
+    if (grid.repeated_lines.empty()) return {table_, std::move(stamps_), {}};
+    for (Index k = 0; k < stamps_.size(); ++k)
+      if (!extra_[static_cast<std::size_t>(k)]) grid.rows.push_back(k);
+    return {table_, stamps_(grid.rows), grid.rows};
+  }
+
+ private:
+  void treat(Index first, Index last, TimeGrid& grid) {
+    const double since = first > 0 ? stamps_[first] - stamps_[first - 1] : 0, until = last + 1 < stamps_.size() ? stamps_[last + 1] - stamps_[last] : 0;
     const double each = since / static_cast<double>(last - first + 1);
-    if (!(step > 0 && each >= step / 2)) {
-      throw InputError(table.place(first + 1), fmt::format("the time {} {} stands in two rows", stamps[first], time.unit),
+    const bool late = since >= gap_steps * step_, early = first > 0 && last == first + 1 && until >= gap_steps * step_;
+    if (early && !late) {
+      stamps_[last] += until / 2;
+      grid.spread_lines.push_back(table_.place(last).line);
+    } else if (!late && step_ > 0 && until < gap_steps * step_ && is_extra(first, last)) {
+      for (Index k = first + 1; k <= last; ++k) {
+        extra_[static_cast<std::size_t>(k)] = true;
+        grid.repeated_lines.push_back(table_.place(k).line);
+      }
+    } else if (step_ > 0 && each >= step_ / 2) {
+      for (Index k = first; k < last; ++k) stamps_[k] = stamps_[first] - each * static_cast<double>(last - k);
+      grid.spread_lines.push_back(table_.place(first + 1).line);
+    } else {
+      throw InputError(table_.place(first + 1), fmt::format("the time {} {} stands in two rows", time_.value[first], time_.unit),
                        "wanted times that increase", "Print the times with more digits, or delete the row that stands twice.");
     }
-    for (Index k = first; k < last; ++k) stamps[k] = stamps[first] - each * static_cast<double>(last - k);
-    lines.push_back(table.place(first + 1).line);
-    first = last;
   }
-  return lines;
+
+  bool is_extra(Index first, Index last) const {
+    for (Index k = first + 1; k <= last; ++k)
+      if (!fine_ && !same_readings(table_, first, k)) return false;
+    return true;
+  }
+
+  const CsvTable& table_;
+  const CsvColumn& time_;
+  VectorXd stamps_;
+  std::vector<bool> extra_;
+  double step_ = 0;
+  bool fine_ = false;
+};
+
+Stamps without_repeated(const CsvTable& table, const CsvColumn& time, TimeGrid& grid) {
+  if (std::adjacent_find(time.value.begin(), time.value.end()) == time.value.end()) return {table, time.value, {}};
+  return RepeatedStamps(table, time).treated(grid);
 }
 
 /// True where the samples after `k` are stamped as early as `k` is stamped late, so that none is missing.
@@ -95,7 +154,8 @@ void fit_line(const VectorXd& stamps, TimeGrid& grid) {
   grid.start = stamps.mean() - grid.step * last / 2;
 }
 
-void refuse_gaps(const CsvTable& table, const CsvColumn& time, const VectorXd& stamps, double digit) {
+void refuse_gaps(const Stamps& judged, const CsvColumn& time, double digit) {
+  const VectorXd& stamps = judged.value;
   const VectorXd interval = intervals(stamps);
   // Gaps lengthen the mean; coarse printing (1, 2, 2 ms) the median.
   const double step = std::min(median(interval), interval.mean());
@@ -104,7 +164,7 @@ void refuse_gaps(const CsvTable& table, const CsvColumn& time, const VectorXd& s
   for (Index k = 1; k < stamps.size(); ++k) {
     if (interval[k - 1] <= limit || is_made_up(stamps, k, step)) continue;
     throw InputError(
-        table.place(k),
+        judged.place(k),
         fmt::format("the recording has a gap from {} to {} {}, {:.4g} sample steps", stamps[k - 1], stamps[k], time.unit,
                     interval[k - 1] / step),
         fmt::format("wanted a sample about every {:.6g} {}", step, time.unit),
@@ -131,14 +191,16 @@ VectorXd on_grid(const VectorXd& value, const TimeGrid& grid, Blend blend) {
 }  // namespace
 
 TimeGrid time_grid(const CsvTable& table, const CsvColumn& time) {
-  const Index count = time.value.size();
-  if (count < 3) {
-    throw InputError({table.file, table.header_line}, fmt::format("{} rows follow the header", count), "wanted three at least", "");
-  }
+  const auto refuse_few = [&](Index rows) {
+    throw InputError({table.file, table.header_line}, fmt::format("{} rows follow the header", rows), "wanted three at least", "");
+  };
+  if (time.value.size() < 3) refuse_few(time.value.size());
   check_stamps(table, time);
   TimeGrid grid;
-  VectorXd stamps = time.value;
-  grid.spread_lines = spread_repeated(table, time, stamps);
+  Stamps judged = without_repeated(table, time, grid);
+  VectorXd& stamps = judged.value;
+  const Index count = stamps.size();
+  if (count < 3) refuse_few(count);
   grid.start = stamps[0];
   grid.step = (stamps[count - 1] - stamps[0]) / static_cast<double>(count - 1);
   const VectorXd places = VectorXd::LinSpaced(count, 0, static_cast<double>(count - 1)) * grid.step;
@@ -150,7 +212,7 @@ TimeGrid time_grid(const CsvTable& table, const CsvColumn& time) {
     fit_line(stamps, grid);
     return grid;
   }
-  refuse_gaps(table, time, stamps, digit);
+  refuse_gaps(judged, time, digit);
   grid.resample = true;
   grid.stamps = std::move(stamps);
   return grid;

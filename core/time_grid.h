@@ -15,11 +15,13 @@ struct TimeGrid {
   bool resample = false;          ///< true where that is more than the rounding of printed stamps
   Eigen::VectorXd stamps;         ///< the stamps, repeated ones spread; empty unless `resample`
   std::vector<int> spread_lines;  ///< lines of the file whose repeated stamps were spread
+  std::vector<Eigen::Index> rows;    ///< of the table, that are samples; empty: all of them
+  std::vector<int> repeated_lines;   ///< lines of the file that stand for no sample of their own and were left out
 };
 
 /// Judges the stamps of `table`'s column `time`; everything is in that column's own unit.
 ///
-/// The grid has as many samples as the file, from the first stamp to the last.
+/// The grid has as many samples as the file has rows that are samples, from the first stamp to the last.
 /// - Stamps within 1e-3 steps of it are on it. So are stamps printed with few digits: within one unit of the last digit of it, with
 ///   intervals that differ by no more than that, which is no more than half a step; there least squares fit the grid. Nothing is
 ///   resampled.
@@ -28,7 +30,9 @@ struct TimeGrid {
 ///   stamps makes up. In a recording whose intervals jitter throughout (median deviation from the step above 1e-3 steps and the last
 ///   printed digit) the limit is 5 steps.
 /// - Data loggers stamp a sample late and the next at the same instant. A run of equal stamps is spread evenly over the time since the one
-///   before, if that leaves at least half a step each.
+///   before, if that leaves at least half a step each. A sample that is stamped early, at the instant of the one before, is moved likewise.
+/// - Where no time is left for it on either side, a row that repeats a stamp is one row too many and is left out: if its readings repeat too,
+///   or if stamps are printed so finely, with two digits or more in a step, that two samples cannot share one.
 ///
 /// Every other stamp that does not increase, a missing one, and fewer than three rows are InputErrors.
 TimeGrid time_grid(const CsvTable& table, const CsvColumn& time);

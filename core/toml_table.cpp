@@ -8,6 +8,7 @@
 #include <optional>
 #include <sstream>
 
+#include "core/text_kind.h"
 #include "core/units.h"
 
 namespace unrig {
@@ -33,6 +34,9 @@ TomlTable::TomlTable(std::shared_ptr<const toml::table> table, std::string file,
     : table_(std::move(table)), file_(std::move(file)), name_(std::move(name)), line_(line) {}
 
 TomlTable TomlTable::parse(std::string_view text, const std::string& file, const std::string& advice) {
+  require_utf8(text, file, 1);
+  std::string converted;
+  if (ends_lines_with_returns(text)) text = converted = with_line_feeds(text);
   try {
     return {std::make_shared<const toml::table>(toml::parse(text)), file, "", 1};
   } catch (const toml::parse_error& error) {

@@ -15,6 +15,7 @@
 #include "core/indicial_table.h"
 #include "core/rigid_load.h"
 #include "core/run_inputs.h"
+#include "core/run_limits.h"
 #include "correct/how_far_to_trust.h"
 #include "correct/knots.h"
 #include "correct/prior.h"
@@ -42,6 +43,8 @@ void check(const CorrectProblem& problem) {
   if (problem.rig.is_modal()) throw InputError({problem.rig.file, 0}, "a rig known only as modes", "wanted a rig with a section and strips", "Describe the section: without it there is no load to separate.");
   if (!run.find("alpha")) throw InputError({run.file, 0}, "no column 'alpha'", "wanted the measured angle of attack", "Record the angle beside the gauge.");
   if (!(run.speed > 0)) throw InputError({run.file, 0}, "speed 0", "wanted a run in a stream", "Circulation needs a stream; free decays are for `unrig fit`.");
+  check_what_drives(run);
+  check_reading_changes(run, "gauge");
   const Rig& rig = problem.rig;
   if (rig.gauge_element > 0 && std::none_of(rig.submerged.begin(), rig.submerged.end(), [&](int element) { return element > rig.gauge_element; }))
     throw InputError({rig.file, 0}, "no submerged element outboard of the gauge", "wanted a section that loads the gauge", "Correct [section] elements or the gauge's element in the rig file.");

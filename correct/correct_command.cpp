@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include "core/command.h"
+#include "core/command_line.h"
 #include "core/given_files.h"
 #include "core/text_file.h"
 #include "correct/correct.h"
@@ -41,7 +42,7 @@ int correct_command(int argc, char** argv) {
   app.add_option("--at-step", imposed.at_step, "impose its value at the step, 0.5 for a thin airfoil (else only tested)")->check(CLI::Range(-1.0, 2.0));
   app.footer("Example:\n  unrig correct --rig rig.toml --fit fit.json step_a.csv -o step_a_corrected.csv --indicial step_a_indicial.csv");
   try {
-    app.parse(argc, argv);
+    parse_command_line(app, argc, argv);
   } catch (const CLI::ParseError& e) {
     return app.exit(e) == 0 ? exit_done : exit_wrong_use;
   }

@@ -1,10 +1,16 @@
+#include <algorithm>
 #include <cstdio>
-#include <cstring>
 #include <exception>
+#include <iterator>
+#include <new>
+#include <string>
+#include <vector>
 
 #include "core/command.h"
 #include "core/error.h"
 #include "core/import/import_command.h"
+#include "core/last_progress.h"
+#include "core/near_word.h"
 #include "correct/correct_command.h"
 #include "correct/report/report_command.h"
 #include "fit/apparent_mass_command.h"
@@ -30,7 +36,7 @@ void print_help(std::FILE* stream) {
   std::fputs("unrig: take the rig out of the reading\n\nusage: unrig COMMAND [OPTIONS]\n\n", stream);
   for (const unrig::Command& command : commands) std::fprintf(stream, "  %-14s %s\n", command.name, command.summary);
   std::fputs(R"(
-`unrig COMMAND --help` explains a command. Exit status: 0 done, 1 no trustworthy answer, 2 wrong use or unusable input.
+`unrig help COMMAND` explains a command. Exit status: 0 done, 1 no trustworthy answer, 2 wrong use or unusable input.
 
 From the recordings of one rig to a page to look at:
     unrig fit      --rig rig.toml dry_pluck.csv wet_pluck.csv step_a.csv -o fit.json
@@ -58,6 +64,60 @@ The manual, with every key, column and verdict: correct/manual (once installed: 
 )", stream);
 }
 
+/// An exception that no command foresees: what was being done, with which files, and where to turn.
+int tell_of_a_fault(const unrig::Command& command, int argc, char** argv, const std::string& what) {
+  const std::string& doing = unrig::last_progress();
+  std::fprintf(stderr, "unrig %s: stopped%s: %s.\nNo file should lead to this: it is a fault of unrig %s. Please report it to whoever you have unrig from, with the files of this call:\n  unrig", command.name,
+               doing.empty() ? "" : (" while " + doing).c_str(), what.c_str(), UNRIG_VERSION);
+  for (int i = 0; i < argc; ++i) std::fprintf(stderr, " %s", argv[i]);
+  std::fputs("\n", stderr);
+  return unrig::exit_no_answer;
+}
+
+int run(const unrig::Command& command, int argc, char** argv) {
+  try {
+    return command.run(argc, argv);
+  } catch (const unrig::InputError& e) {
+    std::fprintf(stderr, "unrig %s: %s\n", command.name, e.what());
+    return unrig::exit_wrong_use;
+  } catch (const unrig::NoAnswer& e) {
+    std::fprintf(stderr, "unrig %s: %s\n", command.name, e.what());
+    return unrig::exit_no_answer;
+  } catch (const std::bad_alloc&) {
+    const std::string& doing = unrig::last_progress();
+    std::fprintf(stderr, "unrig %s: the memory of this machine is not enough%s\n", command.name, doing.empty() ? "" : (" while " + doing).c_str());
+    return unrig::exit_no_answer;
+  } catch (const std::exception& e) {
+    return tell_of_a_fault(command, argc, argv, e.what());
+  }
+}
+
+const unrig::Command* command_called(const std::string& name) {
+  const auto found = std::find_if(std::begin(commands), std::end(commands), [&](const unrig::Command& command) { return name == command.name; });
+  return found == std::end(commands) ? nullptr : found;
+}
+
+int no_such_command(const std::string& name) {
+  std::vector<std::string> names{"help"};
+  for (const unrig::Command& command : commands) names.emplace_back(command.name);
+  const std::string meant = unrig::nearest_word(name, names);
+  std::fprintf(stderr, "unrig: no command '%s'%s\n`unrig help` lists the commands.\n", name.c_str(), meant.empty() ? "" : ("; did you mean " + meant + "?").c_str());
+  return unrig::exit_wrong_use;
+}
+
+/// `unrig help` and `unrig help COMMAND`.
+int help(int argc, char** argv) {
+  if (argc < 3) {
+    print_help(stdout);
+    return unrig::exit_done;
+  }
+  const unrig::Command* const command = command_called(argv[2]);
+  if (!command) return no_such_command(argv[2]);
+  std::string option = "--help";
+  char* words[] = {argv[2], option.data(), nullptr};
+  return run(*command, 2, words);
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
@@ -65,30 +125,12 @@ int main(int argc, char** argv) {
     print_help(stderr);
     return unrig::exit_wrong_use;
   }
-  if (std::strcmp(argv[1], "--help") == 0 || std::strcmp(argv[1], "-h") == 0) {
-    print_help(stdout);
-    return unrig::exit_done;
-  }
-  if (std::strcmp(argv[1], "--version") == 0) {
+  const std::string first = argv[1];
+  if (first == "--help" || first == "-h" || first == "help") return help(first == "help" ? argc : 1, argv);
+  if (first == "--version" || first == "-v" || first == "-V") {
     std::puts("unrig " UNRIG_VERSION);
     return unrig::exit_done;
   }
-  for (const unrig::Command& command : commands) {
-    if (std::strcmp(argv[1], command.name) != 0) continue;
-    try {
-      return command.run(argc - 1, argv + 1);
-    } catch (const unrig::InputError& e) {
-      std::fprintf(stderr, "unrig %s: %s\n", command.name, e.what());
-      return unrig::exit_wrong_use;
-    } catch (const unrig::NoAnswer& e) {
-      std::fprintf(stderr, "unrig %s: %s\n", command.name, e.what());
-      return unrig::exit_no_answer;
-    } catch (const std::exception& e) {
-      std::fprintf(stderr, "unrig %s: internal error: %s\n", command.name, e.what());
-      return unrig::exit_no_answer;
-    }
-  }
-  std::fprintf(stderr, "unrig: no command '%s'\n\n", argv[1]);
-  print_help(stderr);
-  return unrig::exit_wrong_use;
+  if (const unrig::Command* const command = command_called(first)) return run(*command, argc - 1, argv + 1);
+  return no_such_command(first);
 }

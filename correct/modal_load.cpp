@@ -15,6 +15,7 @@
 #include "core/motion.h"
 #include "core/response.h"
 #include "core/run_inputs.h"
+#include "core/run_limits.h"
 #include "correct/how_far_to_trust.h"
 #include "correct/load_smoother.h"
 
@@ -140,6 +141,8 @@ ModalLoad modal_load(const CorrectProblem& problem) {
   check_is_fit_of(model, problem.fit, run.file);
   if (!problem.fit.effects.empty()) throw InputError({problem.fit.file, 0}, "a fit with effects, of a rig known only as modes", "wanted one without", "");
   model.output_channels(run);  // refuses a run of another rig
+  check_what_drives(run);
+  check_reading_changes(run, "gauge");
   const VectorXd theta = theta_for(model, problem.fit, run.file);
 
   ModalLoad result;

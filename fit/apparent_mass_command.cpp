@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include "core/command.h"
+#include "core/command_line.h"
 #include "core/given_files.h"
 #include "core/text_file.h"
 #include "fit/apparent_mass.h"
@@ -22,7 +23,7 @@ int apparent_mass_command(int argc, char** argv) {
   app.add_flag("--no-joint-fit", no_joint_fit, "do not fit the whole coupled model to both decays for comparison");
   app.footer("Example:\n  unrig apparent-mass --rig rig.toml --dry dry_pluck.csv --wet wet_pluck.csv -o apparent.json");
   try {
-    app.parse(argc, argv);
+    parse_command_line(app, argc, argv);
   } catch (const CLI::ParseError& e) {
     return app.exit(e) == 0 ? exit_done : exit_wrong_use;
   }

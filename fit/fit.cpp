@@ -123,6 +123,7 @@ FitResult describe_fit(Arrival& arrival, const FitProblem& problem, Settle first
   describe_parameters(joint, uncertainty, problem.start, result);
   describe_profiles(joint, uncertainty, problem, result);
   judge_answer(result);
+  warn_of_silent_runs(joint, result);
   warn_of_mismatch(result);
   return result;
 }

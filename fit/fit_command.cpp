@@ -7,6 +7,7 @@
 #include <filesystem>
 
 #include "core/command.h"
+#include "core/command_line.h"
 #include "core/given_files.h"
 #include "core/in_parallel.h"
 #include "core/text_file.h"
@@ -33,7 +34,7 @@ int fit_command(int argc, char** argv) {
   app.add_option("--correlations", least, "smallest correlation to report")->capture_default_str();
   app.footer(effect_list() + "\nExample:\n  unrig fit --rig rig.toml dry_pluck.csv wet_pluck.csv step_a.csv -o fit.json");
   try {
-    app.parse(argc, argv);
+    parse_command_line(app, argc, argv);
     std::erase_if(problem.profile, [](const std::string& name) { return name.empty() || name == "{}"; });  // how CLI11 says that nothing follows
     // Runs behind `--profile`.
     const auto files = std::stable_partition(problem.profile.begin(), problem.profile.end(), [](const std::string& name) {

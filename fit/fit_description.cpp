@@ -243,6 +243,16 @@ void judge_answer(FitResult& result) {
   }
 }
 
+void warn_of_silent_runs(const JointProblem& joint, FitResult& result) {
+  for (const RunResidual& run : joint.runs()) {
+    const std::string& file = run.run().file;
+    if (const std::string few = too_few_samples(run.observations(), run.linear_unknowns()); !few.empty() && joint.runs().size() > 1)
+      result.warnings.push_back(fmt::format("{}: the run is too short to say anything by itself: {}", file, few));
+    else if (run.run().kind == RunKind::step && !run.conditions().prescribed_pitch)
+      result.warnings.push_back(fmt::format("{}: the angle does not move by more than its noise; the run says nothing of its slope", file));
+  }
+}
+
 void warn_of_mismatch(FitResult& result) {
   for (const FittedRun& run : result.runs) {
     if (run.aside) {

@@ -36,6 +36,9 @@ std::string too_few_samples(Eigen::Index observations, Eigen::Index variables);
 /// Whether there is a trustworthy answer (FitResult::no_answer); where not, nothing is identified.
 void judge_answer(FitResult& result);
 
+/// Warns of every run that says nothing by itself: too short to tell noise from signal, or a step whose shaft rests. What it should have told is held.
+void warn_of_silent_runs(const JointProblem& joint, FitResult& result);
+
 /// Warns of every run that the model does not explain to its noise: the error bars cannot tell how far that takes the parameters.
 void warn_of_mismatch(FitResult& result);
 

@@ -8,6 +8,7 @@
 #include <fmt/format.h>
 
 #include "core/run_inputs.h"
+#include "core/run_limits.h"
 #include "fit/run_linearised.h"
 
 namespace unrig {
@@ -79,6 +80,23 @@ std::vector<Interval> moving_softly(const VectorXd& angle, double sigma) {
 // Steps need a knot on every sample: 560 of them, four steps in a record, are corrected in 3 s. A motion that goes on and on has to do with fewer.
 Eigen::Index most_knots(std::size_t windows) { return windows > 1 ? 600 : 400; }
 
+namespace {
+
+/// A window that is shorter than the knots lie apart has none of its own: it becomes part of the one beside it. A single one is long enough.
+void join_short(std::vector<MotionBasis::Window>& windows, Index stride) {
+  for (std::size_t w = 0; windows.size() > 1 && w < windows.size();) {
+    if (windows[w].knots.length() >= stride) {
+      ++w;
+      continue;
+    }
+    Interval& beside = windows[w > 0 ? w - 1 : 1].knots;
+    beside = {std::min(beside.first, windows[w].knots.first), std::max(beside.last, windows[w].knots.last)};
+    windows.erase(windows.begin() + static_cast<std::ptrdiff_t>(w));
+  }
+}
+
+}  // namespace
+
 std::vector<MotionBasis::Window> motion_windows(const Run& run) {
   const Channel* alpha = run.find("alpha");
   if (!alpha || run.kind != RunKind::step) return {};
@@ -95,7 +113,9 @@ std::vector<MotionBasis::Window> motion_windows(const Run& run) {
   }
   Index total = 0;
   for (const auto& w : windows) total += w.knots.length();
-  for (auto& w : windows) w.stride = 1 + total / (most_knots(windows.size()) + 1);
+  const Index stride = 1 + total / (most_knots(windows.size()) + 1);
+  join_short(windows, stride);
+  for (auto& w : windows) w.stride = stride;
   return windows;
 }
 
@@ -105,6 +125,7 @@ RunResidual::RunResidual(const AeroelasticModel& model, const Run& run, std::vec
       conditions_(options.conditions.value_or(conditions_of(run))),
       channels_(model.output_channels(run)),
       motion_(run.samples(), run.dt, motion) {
+  check_what_drives(run);
   conditions_.prescribed_pitch = motion_.unknowns() > 0;
   const Index n = run.samples();
   last_sample_ = n;

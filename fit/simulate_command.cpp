@@ -9,6 +9,7 @@
 #include <optional>
 
 #include "core/command.h"
+#include "core/command_line.h"
 #include "core/given_files.h"
 #include "core/indicial_table.h"
 #include "core/run_text.h"
@@ -194,7 +195,7 @@ int simulate_command(int argc, char** argv) {
   app.add_flag("--as-recorded", options.as_recorded, "every reading of the angle as it is, its noise too; otherwise a measured angle is simulated as the smooth motion that it says");
   app.footer("Example:\n  unrig simulate --rig rig.toml --run step.csv --set normal.damping_ratio=0 -o simulated.csv");
   try {
-    app.parse(argc, argv);
+    parse_command_line(app, argc, argv);
   } catch (const CLI::ParseError& e) {
     return app.exit(e) == 0 ? exit_done : exit_wrong_use;
   }

@@ -11,6 +11,7 @@
 #include "core/import/table_cells.h"
 #include "core/import/time_stamp.h"
 #include "core/scan.h"
+#include "core/text_kind.h"
 
 namespace unrig {
 namespace {
@@ -295,16 +296,13 @@ std::string in_utf8(std::string text) {
     }
     return out;
   }
-  for (std::size_t i = 0; i < text.size(); ++i) {
-    if (byte(i) < 0x80) continue;
-    const std::size_t more = byte(i) >= 0xF0 ? 3 : byte(i) >= 0xE0 ? 2 : byte(i) >= 0xC2 ? 1 : 0;
-    bool whole = more > 0 && byte(i) < 0xF5 && i + more < text.size();
-    for (std::size_t k = 1; whole && k <= more; ++k) whole = (byte(i + k) & 0xC0) == 0x80;
-    if (!whole) {
+  for (std::size_t at = 0; at < text.size();) {
+    const std::size_t length = utf8_length(std::string_view(text).substr(at));
+    if (length == 0) {
       for (std::size_t k = 0; k < text.size(); ++k) add(byte(k));
       return out;
     }
-    i += more;
+    at += length;
   }
   return text;
 }

@@ -10,9 +10,10 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include "core/column_names.h"
 #include "core/import/bridge.h"
-#include "core/import/column_names.h"
 #include "core/import/delimited.h"
+#include "core/import/lvm.h"
 #include "core/import/mat5.h"
 #include "core/import/mat73.h"
 #include "core/import/tdms.h"
@@ -20,15 +21,18 @@
 #include "core/run.h"
 #include "core/run_text.h"
 #include "core/text_file.h"
+#include "core/text_kind.h"
 #include "core/toml_table.h"
 #include "core/units.h"
 
 namespace unrig {
 namespace {
 
+constexpr const char* known_formats = "wanted TDMS, MATLAB 5 or 7.3, universal file 58, a LabVIEW measurement file, or text";
 constexpr const char* mapping_advice = "`unrig import --help` shows an example.";
 
 TomlTable parse_mapping(const std::string& text, const std::string& file) {
+  refuse_other_kinds(text, file, TextKind::mapping);
   TomlTable mapping = TomlTable::parse(text, file, mapping_advice);
   if (!mapping.has("unrig_import") || mapping.integer("unrig_import") != 1)
     mapping.fail("unrig_import", "the file does not say that it is a mapping", "wanted `unrig_import = 1`", mapping_advice);
@@ -36,10 +40,14 @@ TomlTable parse_mapping(const std::string& text, const std::string& file) {
   return mapping;
 }
 
+/// By its name; else by what the file calls it elsewhere.
 const RecordedChannel& source_of(const TomlTable& table, const Recording& recording) {
   const std::string name = table.text("source");
   const auto is_it = [&](const auto& channel) { return channel.name == name; };
-  const auto found = std::find_if(recording.channels.begin(), recording.channels.end(), is_it);
+  const auto is_called_so = [&](const RecordedChannel& channel) { return channel.label == name; };
+  auto found = std::find_if(recording.channels.begin(), recording.channels.end(), is_it);
+  if (found == recording.channels.end() && std::count_if(recording.channels.begin(), recording.channels.end(), is_called_so) == 1)
+    found = std::find_if(recording.channels.begin(), recording.channels.end(), is_called_so);
   const auto left_out = std::find_if(recording.left_out.begin(), recording.left_out.end(), is_it);
   if (std::count_if(recording.channels.begin(), recording.channels.end(), is_it) + std::count_if(recording.left_out.begin(), recording.left_out.end(), is_it) > 1)
     table.fail("source", fmt::format("{} holds more than one channel \"{}\"", recording.file, name), "wanted a name that only one of them has; rename the others in the recording");
@@ -246,16 +254,21 @@ Imported import_recording(const Recording& recording, const std::string& mapping
 Recording read_recording(const std::string& path, const std::string& mapping_text, const std::string& mapping_file) {
   std::string bytes = read_text(path);
   const TomlTable mapping = parse_mapping(mapping_text, mapping_file);
+  if (bytes.starts_with("PK\x03\x04") || bytes.starts_with("\xD0\xCF\x11\xE0"))
+    throw InputError({path, 0}, "this is an Excel workbook (.xlsx, .xls), or another packed file", known_formats, "Export the sheet as CSV (in Excel: save as \"CSV UTF-8\").");
   if (bytes.starts_with("TDSm")) return read_tdms(bytes, path);
   if (bytes.size() > 520 && bytes.compare(512, 4, "\x89HDF") == 0) return read_mat73(path);
   if (bytes.starts_with("MATLAB")) return read_mat5(bytes, path);
-  for (const auto& [start, what] : {std::pair{"\x89HDF", "this HDF5 file is not MATLAB's (Octave's `save -hdf5` writes such)"}, {"Octave-1-", "the file is in Octave's own binary format"}, {"# Created by Octave", "the file is in Octave's own text format"}})
+  const bool octaves = bytes.starts_with("\x89HDF") && bytes.find("OCTAVE_NEW_FORMAT") != std::string::npos;
+  if (bytes.starts_with("\x89HDF") && !octaves) return read_mat73(path);  // as h5py writes it
+  for (const auto& [start, what] : {std::pair{"\x89HDF", "the file is in Octave's own form of HDF5 (`save -hdf5`)"}, {"Octave-1-", "the file is in Octave's own binary format"}, {"# Created by Octave", "the file is in Octave's own text format"}})
     if (bytes.starts_with(start)) throw InputError({path, 0}, what, "wanted a MATLAB file of version 5 or 7.3", "Save it again with `save -v7 FILE`.");
   const std::string_view first = std::string_view(bytes).substr(0, bytes.find('\n'));
   if (first.find_first_not_of(" \r") != std::string_view::npos && first.substr(first.find_first_not_of(" ")).starts_with("-1") && first.size() <= 82 && first.find_first_of(",;\t") == std::string_view::npos)
     return read_uff(bytes, path);
   bytes = in_utf8(std::move(bytes));
-  if (bytes.find('\0') != std::string::npos) throw InputError({path, 0}, "the file is binary, and in no format that is known here", "wanted TDMS, MATLAB 5 or 7.3, universal file 58, or text", "");
+  if (bytes.find('\0') != std::string::npos) throw InputError({path, 0}, "the file is binary, and in no format that is known here", known_formats, "");
+  if (is_lvm(bytes)) return read_lvm(bytes, path, read_format(mapping));
   return read_delimited(bytes, path, read_format(mapping));
 }
 

@@ -1,45 +1,31 @@
 #include "core/import/import_command.h"
 
-#include <algorithm>
-#include <cmath>
-
 #include <CLI/CLI.hpp>
 #include <fmt/format.h>
 
 #include "core/command.h"
+#include "core/command_line.h"
 #include "core/error.h"
 #include "core/given_files.h"
+#include "core/import/channel_list.h"
 #include "core/import/import.h"
 #include "core/text_file.h"
 
 namespace unrig {
-namespace {
-
-void list_channels(const Recording& recording) {
-  fmt::print("{}: {}, {} channels\n", recording.file, recording.format, recording.channels.size());
-  for (const RecordedChannel& channel : recording.channels) {
-    const auto missing = std::count_if(channel.value.begin(), channel.value.end(), [](double x) { return !std::isfinite(x); });
-    fmt::print("  {:<30} {:>9} samples{}{}{}{}{}\n", channel.name, channel.value.size(), missing == 0 ? "" : fmt::format(", {} missing", missing), channel.unit.empty() ? "" : ", in " + channel.unit,
-               channel.remark.empty() ? "" : " " + channel.remark, channel.step > 0 ? fmt::format(", every {:.9g} s", channel.step) : "", channel.raw.empty() ? "" : ", UNSCALED: " + channel.raw);
-  }
-  for (const LeftOutChannel& left : recording.left_out) fmt::print("  {:<30} left out: {} (line {})\n", left.name, left.why, left.line);
-}
-
-}  // namespace
 
 int import_command(int argc, char** argv) {
-  CLI::App app{"Turns a laboratory's file into a run file: text of any delimiter, MATLAB 5 and 7.3, NI TDMS, universal file 58.", "unrig import"};
+  CLI::App app{"Turns a laboratory's file into a run file: text of any delimiter, LabVIEW's .lvm, MATLAB 5 and 7.3, NI TDMS, universal file 58.", "unrig import"};
   std::string path, map, output;
   bool list = false;
   app.add_option("file", path, "the file; its format is told by its content")->required();
   app.add_option("--map", map, "mapping (TOML): which channel becomes which column, and what the run is");
   app.add_option("-o,--output", output, "run file (CSV)");
-  app.add_flag("--list", list, "only list the file's channels");
+  app.add_flag("--list", list, "only list the file's channels: unit, rate, range, mean, noise; so it does without --map and -o");
   app.footer(
-      "Example:\n  unrig import step.tdms --list\n  unrig import step.tdms --map map.toml -o step.csv\n\nwith a map.toml such as\n"
+      "Example:\n  unrig import step.tdms\n  unrig import step.tdms --map map.toml -o step.csv\n\nwith a map.toml such as\n"
       "  unrig_import = 1\n  [run]\n  kind = \"step\"\n  medium = \"water\"\n  density = \"998.2 kg/m^3\"\n  speed = \"0.6 m/s\"\n  calibration = \"4.4 N/V\"\n"
       "  [time]                       # left out where the file gives the sampling of its channels\n  rate = \"500 Hz\"              # or: source = \"Time\", unit = \"s\" (time stamps of ISO 8601: no unit)\n"
-      "  [[column]]\n  name = \"alpha\"\n  source = \"Rig/Angle\"         # as --list shows it\n  unit = \"deg\"                 # where the file gives none\n"
+      "  [[column]]\n  name = \"alpha\"\n  source = \"Rig/Angle\"         # as the list shows it\n  unit = \"deg\"                 # where the file gives none\n"
       "  [[column]]\n  name = \"gauge\"\n  source = \"Rig/Bridge\"\n  unit = \"V\"\n"
       "  # raw = true                 # takes unscaled converter counts, for a calibration in N per count\n"
       "  # bridge.kind = \"full-1\"     # volts to strain: quarter-1, quarter-2, half-1, half-2, full-1, full-2, full-3,\n"
@@ -48,11 +34,12 @@ int import_command(int argc, char** argv) {
       "  # [format]                   # of text, where it is not found out: delimiter = \";\", decimal = \",\", thousands = \".\",\n"
       "  #                            # missing = [\"ERR\", \"#N/A\"], skip_lines = 3, header = false");
   try {
-    app.parse(argc, argv);
+    parse_command_line(app, argc, argv);
   } catch (const CLI::ParseError& e) {
     return app.exit(e) == 0 ? exit_done : exit_wrong_use;
   }
-  if (!list && (map.empty() || output.empty())) throw InputError({path, 0}, "--map or --output is missing", "wanted both, or --list", "`unrig import --help` shows an example.");
+  list = list || (map.empty() && output.empty());
+  if (!list && (map.empty() || output.empty())) throw InputError({path, 0}, "--map or --output is missing", "wanted both, or neither for a list of the channels", "`unrig import --help` shows an example.");
   if (!list) check_outputs({{"-o", output}}, {path, map});
   const std::string mapping = map.empty() ? "unrig_import = 1\n" : read_text(map);
   Progress progress;
@@ -61,7 +48,7 @@ int import_command(int argc, char** argv) {
   if (list) {
     progress.clear();
     for (const std::string& warning : recording.warnings) warn(warning);
-    list_channels(recording);
+    fmt::print("{}", channel_list(recording));
     return exit_done;
   }
   progress("writing " + output);

@@ -3,6 +3,7 @@
 #include <zlib.h>
 
 #include <cstdint>
+#include <optional>
 
 #include <fmt/format.h>
 
@@ -15,8 +16,8 @@ namespace {
 
 using u32 = std::uint32_t;
 
-enum Type : u32 { type_matrix = 14, type_packed = 15 };
-enum Class : u32 { class_structure = 2, class_object = 3, class_double = 6, class_single = 7, class_last_number = 15, class_opaque = 17 };
+enum Type : u32 { type_matrix = 14, type_packed = 15, type_utf8 = 16, type_utf16 = 17 };
+enum Class : u32 { class_cell = 1, class_structure = 2, class_object = 3, class_text = 4, class_double = 6, class_single = 7, class_last_number = 15, class_opaque = 17 };
 constexpr u32 flag_complex = 0x800;
 
 struct Element {
@@ -106,6 +107,7 @@ class Mat5File {
       }
     }
     if (out_.channels.empty()) refuse("the file holds no variable with real numbers");
+    name_columns(texts_, out_);
     return std::move(out_);
   }
 
@@ -141,6 +143,7 @@ class Mat5File {
       size.push_back(static_cast<std::size_t>(n));
     }
     if (kind == class_structure || kind == class_object) return structure(from, name, size, kind == class_object, depth);
+    if (kind == class_cell) return cell(from, name);
     if (kind < class_double || kind > class_last_number) return leave_out(name, "it holds no numbers", out_);
     if ((flags & flag_complex) != 0) return leave_out(name, "its numbers are complex", out_);
     add_matrix(name, size, kind != class_double && kind != class_single, stored_numbers(next_element(from), from.is_big_endian()), out_);
@@ -166,8 +169,34 @@ class Mat5File {
       }
   }
 
+  /// Kept where it holds texts only.
+  void cell(ByteReader& from, const std::string& name) {
+    std::vector<std::string> texts;
+    while (from.left() >= 8 && texts.size() < most_structures) {
+      const Element held = next_element(from);
+      const std::optional<std::string> text = held.type == type_matrix ? text_in(ByteReader(held.data, from.is_big_endian())) : std::nullopt;
+      if (!text) return leave_out(name, "it holds no numbers", out_);
+      texts.push_back(*text);
+    }
+    texts_.push_back({name, std::move(texts)});
+  }
+
+  static std::optional<std::string> text_in(ByteReader from) {
+    if (from.left() == 0) return "";
+    const Element flags = next_element(from);
+    if (flags.data.size() < 4 || (ByteReader::number_at<u32>(flags.data.data(), from.is_big_endian()) & 0xff) != class_text) return std::nullopt;
+    next_element(from);  // its size
+    next_element(from);  // its name
+    const Element letters = next_element(from);
+    if (letters.type == type_utf8) return std::string(letters.data);
+    std::vector<std::uint16_t> units;
+    for (const double unit : stored_numbers({letters.type == type_utf16 ? 4u : letters.type, letters.data}, from.is_big_endian())) units.push_back(static_cast<std::uint16_t>(static_cast<std::int64_t>(unit) & 0xffff));
+    return text_of_units(units);
+  }
+
   std::string_view bytes_;
   Recording out_;
+  std::vector<NamedTexts> texts_;
   std::string name_;  ///< of the variable that is being read
 };
 

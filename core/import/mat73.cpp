@@ -1,7 +1,11 @@
 #include "core/import/mat73.h"
 
 #include <fmt/format.h>
-#include <matio.h>
+#if __has_include(<hdf5.h>)
+#include <hdf5.h>
+#else
+#include <hdf5/serial/hdf5.h>  // where Debian has it
+#endif
 #include <sys/mman.h>
 #include <sys/prctl.h>
 #include <sys/resource.h>
@@ -9,112 +13,223 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <array>
 #include <cerrno>
 #include <csignal>
 #include <cstdint>
 #include <cstring>
 #include <filesystem>
 #include <fstream>
-#include <memory>
 #include <optional>
 #include <stdexcept>
 
 #include "core/error.h"
 #include "core/import/byte_reader.h"
 #include "core/import/matlab_matrix.h"
+#include "core/scan.h"
 #include "core/text_file.h"
 
 namespace unrig {
 namespace {
 
-struct CloseMat {
-  void operator()(mat_t* file) const { Mat_Close(file); }
-};
-struct FreeVariable {
-  void operator()(matvar_t* variable) const { Mat_VarFree(variable); }
-};
-
-void be_quiet(int, char*) {}
-
-template <class T>
-void append(const void* data, std::size_t count, std::vector<double>& values) {
-  const T* numbers = static_cast<const T*>(data);
-  values.reserve(count);
-  for (std::size_t k = 0; k < count; ++k) values.push_back(static_cast<double>(numbers[k]));
-}
-
-/// The first numbers of the variable; false where it holds none.
-bool numbers(const matvar_t& v, std::size_t count, std::vector<double>& values) {
-  switch (v.class_type) {
-    case MAT_C_DOUBLE: return append<double>(v.data, count, values), true;
-    case MAT_C_SINGLE: return append<float>(v.data, count, values), true;
-    case MAT_C_INT8: return append<mat_int8_t>(v.data, count, values), true;
-    case MAT_C_UINT8: return append<mat_uint8_t>(v.data, count, values), true;
-    case MAT_C_INT16: return append<mat_int16_t>(v.data, count, values), true;
-    case MAT_C_UINT16: return append<mat_uint16_t>(v.data, count, values), true;
-    case MAT_C_INT32: return append<mat_int32_t>(v.data, count, values), true;
-    case MAT_C_UINT32: return append<mat_uint32_t>(v.data, count, values), true;
-    case MAT_C_INT64: return append<mat_int64_t>(v.data, count, values), true;
-    case MAT_C_UINT64: return append<mat_uint64_t>(v.data, count, values), true;
-    default: return false;
+/// An object of HDF5 that closes itself.
+class H5Handle {
+ public:
+  H5Handle(hid_t id, herr_t (*close)(hid_t)) : id_(id), close_(close) {}
+  ~H5Handle() {
+    if (id_ >= 0) close_(id_);
   }
+  H5Handle(const H5Handle&) = delete;
+  H5Handle& operator=(const H5Handle&) = delete;
+  explicit operator bool() const { return id_ >= 0; }
+  operator hid_t() const { return id_; }
+
+ private:
+  hid_t id_;
+  herr_t (*close_)(hid_t);
+};
+
+/// Text of a fixed length, whatever stands behind its end: NUL (MATLAB), NULs up to the length (h5py, hdf5storage), or blanks.
+H5Handle text_type(std::size_t length) {
+  const hid_t type = H5Tcopy(H5T_C_S1);
+  H5Tset_size(type, std::max<std::size_t>(1, length));
+  H5Tset_strpad(type, H5T_STR_NULLPAD);
+  return {type, H5Tclose};
 }
 
-void take(const matvar_t& v, const std::string& name, int depth, Recording& out);
+std::string without_padding(std::string_view text) { return std::string(trimmed(text.substr(0, text.find('\0')))); }
 
-void take_structure(const matvar_t& v, const std::string& name, int depth, Recording& out) {
-  const unsigned fields = Mat_VarGetNumberOfFields(const_cast<matvar_t*>(&v));
-  char* const* names = Mat_VarGetStructFieldnames(&v);
-  std::size_t elements = 1;
-  for (int d = 0; d < v.rank; ++d) elements *= v.dims[d];
-  if (!names || !v.data || elements > most_structures || v.nbytes < elements * fields * sizeof(matvar_t*)) return leave_out(name, "its fields cannot be read", out);
-  for (std::size_t i = 0; i < elements; ++i)
-    for (unsigned f = 0; f < fields; ++f)
-      if (const matvar_t* field = Mat_VarGetStructFieldByIndex(const_cast<matvar_t*>(&v), f, i)) take(*field, field_name(name, i, elements, names[f]), depth + 1, out);
+/// Empty where the object has no such attribute, or no text in it.
+std::string text_attribute(hid_t object, const char* name) {
+  if (H5Aexists(object, name) <= 0) return "";
+  const H5Handle attribute(H5Aopen(object, name, H5P_DEFAULT), H5Aclose);
+  const H5Handle type(attribute ? H5Aget_type(attribute) : -1, H5Tclose);
+  if (!type || H5Tget_class(type) != H5T_STRING || H5Tis_variable_str(type) > 0) return "";
+  constexpr std::size_t longest = 256;
+  std::string text(std::min(longest, H5Tget_size(type)), '\0');
+  return H5Aread(attribute, text_type(text.size()), text.data()) < 0 ? "" : without_padding(text);
 }
 
-void take(const matvar_t& v, const std::string& name, int depth, Recording& out) {
-  if (depth > deepest_structure) return leave_out(name, "its structures are nested more than eight deep", out);
-  if (v.class_type == MAT_C_STRUCT) return take_structure(v, name, depth, out);
-  if (v.isComplex) return leave_out(name, "its numbers are complex", out);
-  std::vector<double> held;
-  // The data that were read, not the size that the file claims.
-  const std::size_t count = v.data ? v.nbytes / static_cast<std::size_t>(std::max(v.data_size, 1)) : 0;
-  if (!numbers(v, count, held)) return leave_out(name, "it holds no numbers", out);
-  add_matrix(name, v.dims ? std::vector<std::size_t>(v.dims, v.dims + v.rank) : std::vector<std::size_t>{}, v.class_type != MAT_C_DOUBLE && v.class_type != MAT_C_SINGLE, held, out);
-}
-
-/// Bytes that the variable and what is in it claim to hold.
-double claimed_bytes(const matvar_t& v, int depth = 0) {
+/// What a dataset is, as far as it matters here.
+struct Dataset {
+  H5T_class_t stored = H5T_NO_CLASS;
+  std::string matlab;             ///< its class; empty in a file that MATLAB's rules had no part in
+  std::vector<std::size_t> size;  ///< as MATLAB counts: its first dimension is the last of HDF5
   double elements = 1;
-  for (int d = 0; d < v.rank && v.dims; ++d) elements *= static_cast<double>(v.dims[d]);
-  if (v.class_type != MAT_C_STRUCT && v.class_type != MAT_C_CELL) return elements * std::max(v.data_size, 1);
-  double sum = elements;
-  const std::size_t held = v.data && v.data_size > 0 ? v.nbytes / static_cast<std::size_t>(v.data_size) : 0;
-  for (std::size_t i = 0; i < held && depth < 16; ++i)
-    if (const matvar_t* inner = static_cast<matvar_t* const*>(v.data)[i]) sum += claimed_bytes(*inner, depth + 1);
-  return sum;
+  std::size_t bytes = 0;  ///< of an element
+  bool damaged = false;   ///< its chunks have another shape than itself: HDF5 takes all memory over them
+};
+
+Dataset described(hid_t id) {
+  Dataset dataset;
+  const H5Handle type(H5Dget_type(id), H5Tclose), space(H5Dget_space(id), H5Sclose);
+  if (!type || !space) return dataset;
+  dataset.stored = H5Tget_class(type);
+  dataset.bytes = H5Tget_size(type);
+  dataset.matlab = text_attribute(id, "MATLAB_class");
+  const int rank = H5Sget_simple_extent_ndims(space);
+  std::vector<hsize_t> extent(static_cast<std::size_t>(std::max(0, rank)));
+  if (rank > 0) H5Sget_simple_extent_dims(space, extent.data(), nullptr);
+  for (const hsize_t n : extent) dataset.elements *= static_cast<double>(n);
+  dataset.size.assign(extent.rbegin(), extent.rend());
+  while (dataset.size.size() < 2) dataset.size.push_back(1);
+  const H5Handle layout(H5Dget_create_plist(id), H5Pclose);
+  dataset.damaged = layout && H5Pget_layout(layout) == H5D_CHUNKED && H5Pget_chunk(layout, 0, nullptr) != rank;
+  return dataset;
 }
 
-/// Nothing where this is no such file.
-std::optional<Recording> read_here(const std::string& path) {
-  Mat_LogInitFunc("unrig", be_quiet);
-  const std::unique_ptr<mat_t, CloseMat> file(Mat_Open(path.c_str(), MAT_ACC_RDONLY));
-  if (!file) return std::nullopt;
-  Recording out{path, "MAT", {}, {}};
-  constexpr double densest = 1032;  // bytes that a byte of deflate can become (RFC 1951: 258 for two bits)
-  const double most = densest * static_cast<double>(std::filesystem::file_size(path));
-  while (const std::unique_ptr<matvar_t, FreeVariable> variable{Mat_VarReadNextInfo(file.get())}) {
-    const std::string name = variable->name ? variable->name : "";
-    if (claimed_bytes(*variable) > most)
-      leave_out(name, "it claims to be larger than the file can hold", out);
-    else if (Mat_VarReadDataAll(file.get(), variable.get()) != 0)
-      leave_out(name, "it cannot be read", out);
-    else
-      take(*variable, name, 0, out);
-  }
-  return out;
+bool is_number_class(const std::string& matlab) {
+  constexpr std::array classes = {"double", "single", "int8", "uint8", "int16", "uint16", "int32", "uint32", "int64", "uint64", "logical"};
+  return std::find(classes.begin(), classes.end(), matlab) != classes.end();
 }
+
+class Mat73File {
+ public:
+  explicit Mat73File(const std::string& path) : out_{path, "MAT", {}, {}} {
+    constexpr double densest = 1032;  // bytes that a byte of deflate can become (RFC 1951: 258 for two bits)
+    most_bytes_ = densest * static_cast<double>(std::filesystem::file_size(path));
+  }
+
+  /// Nothing where this is no HDF5 file.
+  std::optional<Recording> read() {
+    H5Eset_auto2(H5E_DEFAULT, nullptr, nullptr);  // what fails is told here
+    const H5Handle file(H5Fopen(out_.file.c_str(), H5F_ACC_RDONLY, H5P_DEFAULT), H5Fclose);
+    if (!file) return std::nullopt;
+    const H5Handle root(H5Gopen2(file, "/", H5P_DEFAULT), H5Gclose);
+    if (!root) return std::nullopt;
+    for (const std::string& name : members(root))
+      if (!name.starts_with('#')) member(root, name, name, 0);  // MATLAB's own: #refs#, #subsystem#
+    name_columns(texts_, out_);
+    return std::move(out_);
+  }
+
+ private:
+  std::vector<std::string> members(hid_t group) const {
+    constexpr hsize_t most = 100000;
+    H5G_info_t info{};
+    std::vector<std::string> names;
+    if (H5Gget_info(group, &info) < 0) return names;
+    for (hsize_t i = 0; i < std::min(info.nlinks, most); ++i) {
+      char name[256] = "";
+      if (H5Lget_name_by_idx(group, ".", H5_INDEX_NAME, H5_ITER_INC, i, name, sizeof name, H5P_DEFAULT) > 0) names.emplace_back(name);
+    }
+    return names;
+  }
+
+  void member(hid_t group, const std::string& key, const std::string& name, int depth) {
+    const H5Handle object(H5Oopen(group, key.c_str(), H5P_DEFAULT), H5Oclose);
+    object ? take(object, name, depth) : leave_out(name, "it cannot be read", out_);
+  }
+
+  void take(hid_t object, const std::string& name, int depth) {
+    if (depth > deepest_structure) return leave_out(name, "its structures are nested more than eight deep", out_);
+    const H5I_type_t kind = H5Iget_type(object);
+    if (kind == H5I_GROUP) {
+      for (const std::string& field : members(object)) this->field(object, field, name, depth + 1);
+      return;
+    }
+    if (kind != H5I_DATASET) return leave_out(name, "it holds no numbers", out_);
+    const Dataset dataset = described(object);
+    if (H5Aexists(object, "MATLAB_empty") > 0) return leave_out(name, "it is empty", out_);
+    if (dataset.damaged) return leave_out(name, "it is damaged", out_);
+    if (dataset.elements * static_cast<double>(dataset.bytes) > most_bytes_) return leave_out(name, "it claims to be larger than the file can hold", out_);
+    if (dataset.stored == H5T_REFERENCE) return cell(object, dataset, name);
+    if (dataset.stored == H5T_COMPOUND) return leave_out(name, "its numbers are complex", out_);
+    if (dataset.stored == H5T_STRING) return take_texts(name, stored_texts(object, dataset));
+    const bool numbers = dataset.stored == H5T_FLOAT || dataset.stored == H5T_INTEGER;
+    if (!numbers || !(dataset.matlab.empty() || is_number_class(dataset.matlab))) return leave_out(name, "it holds no numbers", out_);
+    std::vector<double> values(static_cast<std::size_t>(dataset.elements));
+    if (!values.empty() && H5Dread(object, H5T_NATIVE_DOUBLE, H5S_ALL, H5S_ALL, H5P_DEFAULT, values.data()) < 0) return leave_out(name, "it cannot be read", out_);
+    const bool integers = dataset.matlab.empty() ? dataset.stored == H5T_INTEGER : dataset.matlab != "double" && dataset.matlab != "single";
+    add_matrix(name, dataset.size, integers, values, out_);
+  }
+
+  /// A field of an array of structures holds a reference for each of them.
+  void field(hid_t group, const std::string& key, const std::string& structure, int depth) {
+    const std::string name = field_name(structure, 0, 1, key);
+    const H5Handle object(H5Oopen(group, key.c_str(), H5P_DEFAULT), H5Oclose);
+    if (!object) return leave_out(name, "it cannot be read", out_);
+    const Dataset dataset = H5Iget_type(object) == H5I_DATASET ? described(object) : Dataset{};
+    if (dataset.stored != H5T_REFERENCE || !dataset.matlab.empty()) return take(object, name, depth);
+    const std::vector<hobj_ref_t> references = references_of(object, dataset);
+    if (references.empty()) return leave_out(name, "its fields cannot be read", out_);
+    for (std::size_t i = 0; i < references.size(); ++i) {
+      const H5Handle element(H5Rdereference2(object, H5P_DEFAULT, H5R_OBJECT, &references[i]), H5Oclose);
+      const std::string own = field_name(structure, i, references.size(), key);
+      element ? take(element, own, depth) : leave_out(own, "it cannot be read", out_);
+    }
+  }
+
+  std::vector<hobj_ref_t> references_of(hid_t object, const Dataset& dataset) const {
+    if (!(dataset.elements <= static_cast<double>(most_structures)) || dataset.bytes != sizeof(hobj_ref_t)) return {};
+    std::vector<hobj_ref_t> references(static_cast<std::size_t>(dataset.elements));
+    if (!references.empty() && H5Dread(object, H5T_STD_REF_OBJ, H5S_ALL, H5S_ALL, H5P_DEFAULT, references.data()) < 0) return {};
+    return references;
+  }
+
+  void cell(hid_t object, const Dataset& dataset, const std::string& name) {
+    std::vector<std::string> texts;
+    for (const hobj_ref_t& reference : references_of(object, dataset)) {
+      const H5Handle element(H5Rdereference2(object, H5P_DEFAULT, H5R_OBJECT, &reference), H5Oclose);
+      if (!element || H5Iget_type(element) != H5I_DATASET) return leave_out(name, "it holds no numbers", out_);
+      const Dataset held = described(element);
+      if (held.matlab != "char" || held.stored != H5T_INTEGER) return leave_out(name, "it holds no numbers", out_);
+      constexpr double longest = 1000;
+      std::vector<std::uint16_t> letters(held.elements <= longest ? static_cast<std::size_t>(held.elements) : 0);
+      if (!letters.empty() && H5Dread(element, H5T_NATIVE_UINT16, H5S_ALL, H5S_ALL, H5P_DEFAULT, letters.data()) < 0) letters.clear();
+      texts.push_back(text_of_units(letters));
+    }
+    take_texts(name, std::move(texts));
+  }
+
+  /// As h5py stores a list of texts.
+  std::vector<std::string> stored_texts(hid_t object, const Dataset& dataset) const {
+    std::vector<std::string> texts;
+    if (!(dataset.elements <= static_cast<double>(most_structures))) return texts;
+    const auto count = static_cast<std::size_t>(dataset.elements);
+    const H5Handle type(H5Dget_type(object), H5Tclose), space(H5Dget_space(object), H5Sclose);
+    if (H5Tis_variable_str(type) > 0) {
+      std::vector<char*> held(count, nullptr);
+      if (H5Dread(object, type, H5S_ALL, H5S_ALL, H5P_DEFAULT, held.data()) < 0) return texts;
+      for (const char* text : held) texts.push_back(text ? without_padding(text) : "");
+      H5Dvlen_reclaim(type, space, H5P_DEFAULT, held.data());
+      return texts;
+    }
+    std::string held(count * dataset.bytes, '\0');
+    if (H5Dread(object, text_type(dataset.bytes), H5S_ALL, H5S_ALL, H5P_DEFAULT, held.data()) < 0) return texts;
+    for (std::size_t i = 0; i < count; ++i) texts.push_back(without_padding(std::string_view(held).substr(i * dataset.bytes, dataset.bytes)));
+    return texts;
+  }
+
+  void take_texts(const std::string& name, std::vector<std::string> texts) {
+    if (texts.size() < 2) return leave_out(name, "it holds no numbers", out_);
+    texts_.push_back({name, std::move(texts)});
+  }
+
+  Recording out_;
+  std::vector<NamedTexts> texts_;
+  double most_bytes_ = 0;
+};
 
 template <class T>
 void put(std::string& bytes, const T* numbers, std::size_t count) {
@@ -127,14 +242,13 @@ void put(std::string& bytes, const std::string& text) {
   bytes += text;
 }
 
-/// For the other process: channels with name, reason for being raw, and values; then the warnings.
+/// For the other process: channels with name, label, unit, reason for being raw, and values; then the warnings.
 std::string packed(const Recording& recording) {
   std::string bytes;
   const std::uint64_t counts[]{recording.channels.size(), recording.warnings.size()};
   put(bytes, counts, 2);
   for (const RecordedChannel& channel : recording.channels) {
-    put(bytes, channel.name);
-    put(bytes, channel.raw);
+    for (const std::string* text : {&channel.name, &channel.label, &channel.unit, &channel.raw}) put(bytes, *text);
     const std::uint64_t samples = channel.value.size();
     put(bytes, &samples, 1);
     put(bytes, channel.value.data(), channel.value.size());
@@ -148,8 +262,8 @@ Recording unpacked(const std::string& bytes, const std::string& path) {
   Recording out{path, "MAT", {}, {}};
   const auto channels = from.number<std::uint64_t>(), warnings = from.number<std::uint64_t>();
   for (std::uint64_t c = 0; c < channels; ++c) {
-    RecordedChannel channel{from.text(), "", {}, "", 0, 0};
-    channel.raw = from.text();
+    RecordedChannel channel;
+    for (std::string* text : {&channel.name, &channel.label, &channel.unit, &channel.raw}) *text = from.text();
     channel.value.resize(from.number<std::uint64_t>());
     const std::string_view values = from.take(channel.value.size() * sizeof(double));
     std::memcpy(channel.value.data(), values.data(), values.size());
@@ -195,7 +309,7 @@ Recording read_mat73(const std::string& path) {
       std::error_code ignored;  // what cannot be read is found out below
       const std::uintmax_t size = std::filesystem::file_size(path, ignored);
       limit(ignored ? 0 : size);
-      const std::optional<Recording> found = read_here(path);
+      const std::optional<Recording> found = Mat73File(path).read();
       if (found) write_text(handed, packed(*found));
       status = found ? child_done : child_no_file;
     } catch (...) {  // the status says that something went wrong
@@ -206,7 +320,7 @@ Recording read_mat73(const std::string& path) {
   while (::waitpid(child, &status, 0) < 0 && errno == EINTR) {
   }
   if (WIFEXITED(status) && WEXITSTATUS(status) == child_no_file) throw refuse("this is no MATLAB file of version 7.3");
-  if (!WIFEXITED(status) || WEXITSTATUS(status) != child_done) throw refuse("the file is damaged: libmatio, which reads it, broke down, or asked for more memory or time than a file of this size can need");
+  if (!WIFEXITED(status) || WEXITSTATUS(status) != child_done) throw refuse("the file is damaged: HDF5, which reads it, broke down, or asked for more memory or time than a file of this size can need");
   Recording out = unpacked(read_text(handed), path);
   if (out.channels.empty()) throw refuse("the file holds no variable with real numbers");
   return out;

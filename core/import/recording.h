@@ -12,6 +12,7 @@ struct RecordedChannel {
   std::string raw;             ///< not empty: these are unscaled converter counts, and why they could not be scaled
   double step = 0, start = 0;  ///< s: where the file gives the channel's own sampling; step 0: it does not
   std::string remark{};        ///< what else to know about it: how time stamps became seconds
+  std::string label{};         ///< what the file calls it elsewhere: in a list of names beside a matrix; a mapping may name it so
 };
 
 /// A column that a text file has and that holds no numbers, or not only numbers.

@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include "core/csv_table.h"
+#include "core/units.h"
 #include "core/wagner.h"
 #include "correct/how_far_to_trust.h"
 #include "correct/report/result_files.h"
@@ -14,11 +15,12 @@ namespace {
 using Eigen::Index;
 using Eigen::VectorXd;
 
-/// The column, in the unit of the file; null where it is absent. Throws InputError where it holds text.
+/// The column, in the unit of the file; null where it is absent. Throws InputError where it holds text, or has a unit that is none.
 const CsvColumn* find(const CsvTable& table, const std::string& name) {
   for (const CsvColumn& c : table.columns) {
     if (c.name != name) continue;
     if (!c.text.empty()) throw InputError({table.file, c.text_line}, fmt::format("the column \"{}\" holds \"{}\"", name, c.text), "wanted numbers", "");
+    if (!c.unit.empty()) si_unit(c.unit, {table.file, table.header_line}, fmt::format("the column \"{}\"", name));
     return &c;
   }
   return nullptr;

@@ -19,6 +19,8 @@
     if (parent) parent.appendChild(element);
     return element;
   };
+  // Dygraphs takes its axis labels for HTML; names and units come from files.
+  const as_text = (text) => String(text ?? '').replace(/[&<>"']/g, (c) => `&#${c.charCodeAt(0)};`);
   const dark = () => !report.printing &&
       (report.theme === 'dark' || (report.theme === 'system' && window.matchMedia('(prefers-color-scheme: dark)').matches));
   const colours = () => palette[dark() ? 'dark' : 'light'];
@@ -139,7 +141,7 @@
     }
     const graph = new Dygraph(box, rows(block, bands), Object.assign({
       labels: [block.x_label, ...block.series.map((s) => s.name)],
-      xlabel: block.x_label, ylabel: block.y_label, series, customBars: bands, fillAlpha: 0.25, legend: 'always', labelsDiv: legend,
+      xlabel: as_text(block.x_label), ylabel: as_text(block.y_label), series, customBars: bands, fillAlpha: 0.25, legend: 'always', labelsDiv: legend,
       labelsSeparateLines: false, axisLabelFontSize: 13, highlightCircleSize: 3, connectSeparatedPoints: false, logscale: !!block.log_y,
       axes: {
         x: {axisLabelFormatter: readable, valueFormatter: readable, logscale: !!block.log_x, axisLabelWidth: 70, ticker: block.log_x ? decades : Dygraph.numericLinearTicks},

@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include "core/command.h"
+#include "core/command_line.h"
 #include "core/error.h"
 #include "core/given_files.h"
 #include "core/text_file.h"
@@ -55,7 +56,7 @@ int report_command(int argc, char** argv) {
   app.add_option("--title", title, "title of the page, in place of the files' names");
   app.footer("Example:\n  unrig report fit.json step_a_corrected.csv step_a_indicial.csv -o report.html");
   try {
-    app.parse(argc, argv);
+    parse_command_line(app, argc, argv);
   } catch (const CLI::ParseError& e) {
     return app.exit(e) == 0 ? exit_done : exit_wrong_use;
   }

@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include "core/command.h"
+#include "core/command_line.h"
 #include "core/error.h"
 #include "core/given_files.h"
 #include "core/in_parallel.h"
@@ -40,7 +41,7 @@ int diagnose_command(int argc, char** argv) {
   app.add_option("-o,--output", output, "result (JSON)")->required();
   app.footer("Example:\n  unrig diagnose --rig rig.toml dry_pluck.csv wet_pluck.csv step_a.csv step_b.csv --heldout step_c.csv -o diagnosis.json");
   try {
-    app.parse(argc, argv);
+    parse_command_line(app, argc, argv);
   } catch (const CLI::ParseError& e) {
     return app.exit(e) == 0 ? exit_done : exit_wrong_use;
   }

@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include "core/command.h"
+#include "core/command_line.h"
 #include "core/error.h"
 #include "core/given_files.h"
 #include "core/in_parallel.h"
@@ -31,7 +32,7 @@ int trial_command(int argc, char** argv) {
   app.add_option("-o,--output", output, "result (JSON)")->required();
   app.footer("Example:\n  unrig trial --rig rig.toml dry_pluck.csv wet_pluck.csv step.csv --effects tank-wave,gauge-lowpass --trials 30 -o trial.json");
   try {
-    app.parse(argc, argv);
+    parse_command_line(app, argc, argv);
   } catch (const CLI::ParseError& e) {
     return app.exit(e) == 0 ? exit_done : exit_wrong_use;
   }

@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cstdio>
 #include <filesystem>
 #include <functional>
 #include <string>
@@ -220,6 +221,62 @@ TEST_F(BadInput, ARunThatDoesNotBelongToTheRig) {
   refused({"correct", "--rig", rig_, "--fit", fit_, step_}, {"fit.json", "normal.stiffness_scale"});
   refused({"apparent-mass", "--rig", rig_, "--dry", dry_, "--wet", step_}, {"step.csv"});
   refused({"apparent-mass", "--rig", rig_, "--dry", decay_, "--wet", dry_}, {"density"});
+}
+
+TEST_F(BadInput, FilesThatWereExchanged) {
+  refused({"fit", "--rig", step_, rig_}, {"step.csv:1: this is a run file (a recording); wanted a rig file", "Have two files been exchanged on the command line?"});
+  refused({"fit", "--rig", rig_, decay_, rig_}, {"rig.toml:1: this is a rig file; wanted a run file"});
+  refused({"simulate", "--rig", rig_, "--run", fit_}, {"fit.json:1: this is a result of unrig (JSON); wanted a run file"});
+  refused({"fit", "--rig", "/dev/zero", decay_}, {"/dev/zero", "no end of it"});
+}
+
+TEST_F(BadInput, AColumnThatWasMeantIsNamed) {
+  expect_refused_step(replaced(step(), "alpha [deg]", "Alpha [deg]"), {"step.csv:7: a step without a column \"alpha\"; there is a column \"Alpha\""});
+  expect_refused_step(replaced(step(), "alpha [deg]", "angle [deg]"), {"there is a column \"angle\""});
+  expect_refused_decay(replaced(decay(), "gauge [N]", "gage [N]"), {"decay.csv:7: ", "there is a column \"gage\""});
+}
+
+/// After ten seconds: "a transform needs finite samples".
+TEST_F(BadInput, ADeadEncoderIsNamed) {
+  std::vector<std::string> lines = lines_of(step());
+  for (std::size_t k = 7; k < lines.size(); ++k) lines[k] = without_cell(lines[k], 1, "2.07");
+  step_ = directory_.file("step.csv", joined(lines));
+  for (const std::vector<std::string>& arguments : {std::vector<std::string>{"fit", "--rig", rig_, decay_, step_}, {"correct", "--rig", rig_, "--fit", fit_, step_}, {"diagnose", "--rig", rig_, decay_, step_}})
+    refused(arguments, {"step.csv:7: the column \"alpha\" never changes, it is 2.07 deg throughout", "dead encoder"});
+}
+
+/// Each of these ended in an error that nobody foresaw.
+TEST_F(BadInput, NumbersThatNothingCanHaveAreRefused) {
+  const auto all = [&](int cell, double factor) {
+    std::vector<std::string> lines = lines_of(step());
+    for (std::size_t k = 7; k < lines.size(); ++k) {
+      std::vector<std::string> cells;
+      for (std::size_t at = 0; at <= lines[k].size();) {
+        const std::size_t end = std::min(lines[k].find(',', at), lines[k].size());
+        cells.push_back(lines[k].substr(at, end - at));
+        at = end + 1;
+      }
+      char number[40];
+      std::snprintf(number, sizeof number, "%.17g", std::stod(cells.at(static_cast<std::size_t>(cell))) * factor);
+      lines[k] = without_cell(lines[k], cell, number);
+    }
+    return joined(lines);
+  };
+  expect_refused_step(all(2, 1e307), {"step.csv:", "the column \"gauge\""});
+  expect_refused_step(all(2, 1e-300), {"step.csv:7: the column \"gauge\" varies by "});
+  expect_refused_step(all(0, 1e307), {"step.csv:9: the time is 2e+304 s"});
+  expect_refused_step(replaced(step(), "0.6096 m/s", "1e300 m/s"), {"step.csv:6: speed is 1e+300 m/s", "speed of light"});
+  expect_refused_decay(replaced(decay(), "998.2 kg/m^3", "1e30 kg/m^3"), {"decay.csv:5: density is 1e+30 kg/m^3", "osmium"});
+}
+
+/// Of the rig file there was one of 240 letters at every step of the way.
+TEST_F(BadInput, AWarningIsSaidOnceAndShort) {
+  const Finished finished = run_unrig(directory_, {"fit", "--rig", rig_, decay_, "-o", directory_.path("out.json")});
+  EXPECT_EQ(finished.status, 0) << finished.err;
+  const std::vector<std::string> lines = lines_of(finished.err);
+  ASSERT_EQ(lines.size(), 1u) << finished.err;
+  EXPECT_THAT(lines[0], HasSubstr("normal.flexibility"));
+  EXPECT_LE(lines[0].size() - rig_.size(), 140u);
 }
 
 TEST_F(BadInput, AFlexibilityThatIsNotPositiveDefinite) {

@@ -11,6 +11,7 @@
 
 #include "core/text_file.h"
 #include "tests/commands/run_unrig.h"
+#include "tests/support/sample_data.h"
 
 namespace unrig {
 namespace {
@@ -216,6 +217,18 @@ TEST(FitOptions, ARunOfFewSamplesIsRefused) {
   const json fit = json::parse(read_text(directory.path("fit.json")));
   for (const json& p : fit["parameters"]) EXPECT_EQ(p["identified"], false) << p;
   EXPECT_EQ(fit_of(directory, beginning(directory, 200), {}).status, 0) << "five periods";
+}
+
+/// Beside longer ones a run of seven rows was taken without a word, and its slope printed as fixed.
+TEST(FitOptions, ARunThatIsTooShortToSayAnythingIsNamed) {
+  const TemporaryDirectory directory;
+  const std::string text = read_text(test::null_campaign("step_a.csv"));
+  std::size_t end = 0;
+  for (int line = 0; line < 7 + 7; ++line) end = text.find('\n', end) + 1;
+  const std::string shorter = directory.file("short.csv", text.substr(0, end));
+  const Finished finished = run_unrig(directory, {"fit", "--rig", test::null_campaign("rig.toml"), test::null_campaign("wet_pluck.csv"), shorter, "-o", directory.path("fit.json")});
+  EXPECT_EQ(finished.status, 0) << finished.err;
+  EXPECT_THAT(finished.err, HasSubstr("short.csv: the run is too short to say anything by itself: 7 samples leave"));
 }
 
 }  // namespace

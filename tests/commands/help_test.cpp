@@ -52,11 +52,23 @@ TEST(Help, OfEveryCommandHasItsOptionsAndAnExample) {
   }
 }
 
+TEST(Help, IsACommandToo) {
+  const TemporaryDirectory directory;
+  EXPECT_EQ(run_unrig(directory, {"help"}).out, run_unrig(directory, {"--help"}).out);
+  const Finished of_fit = run_unrig(directory, {"help", "fit"});
+  EXPECT_EQ(of_fit.status, 0);
+  EXPECT_EQ(of_fit.out, run_unrig(directory, {"fit", "--help"}).out);
+  const Finished unknown = run_unrig(directory, {"help", "fitt"});
+  EXPECT_EQ(unknown.status, 2);
+  EXPECT_THAT(unknown.err, HasSubstr("no command 'fitt'; did you mean fit?"));
+}
+
 TEST(Help, SaysTheVersion) {
   const TemporaryDirectory directory;
   const Finished version = run_unrig(directory, {"--version"});
   EXPECT_EQ(version.status, 0);
   EXPECT_THAT(version.out, ::testing::MatchesRegex("unrig [0-9]+\\.[0-9]+\\.[0-9]+\n"));
+  for (const char* short_form : {"-v", "-V"}) EXPECT_EQ(run_unrig(directory, {short_form}).out, version.out);
 }
 
 TEST(WrongUse, EndsWithStatusTwoAndSaysWhy) {
@@ -69,7 +81,7 @@ TEST(WrongUse, EndsWithStatusTwoAndSaysWhy) {
   const Finished unknown = run_unrig(directory, {"fti"});
   EXPECT_EQ(unknown.status, 2);
   EXPECT_THAT(unknown.out, IsEmpty());
-  EXPECT_THAT(unknown.err, HasSubstr("'fti'"));
+  EXPECT_THAT(unknown.err, HasSubstr("'fti'; did you mean fit?"));
 
   struct {
     std::vector<std::string> arguments;
@@ -78,7 +90,11 @@ TEST(WrongUse, EndsWithStatusTwoAndSaysWhy) {
       {{"fit"}, "--rig is required"},
       {{"fit", "--rig", "rig.toml", "-o", "fit.json"}, "runs is required"},
       {{"fit", "--rig", "rig.toml", "run.csv"}, "--output is required"},
-      {{"fit", "--rig", "rig.toml", "--wanger", "jones", "run.csv", "-o", "fit.json"}, "--wanger"},
+      {{"fit", "--rig", "rig.toml", "--wanger", "jones", "run.csv", "-o", "fit.json"}, "unrig fit: --wanger is no option of this command; did you mean --wagner?"},
+      {{"fit", "--rgi", "rig.toml", "run.csv", "-o", "fit.json"}, "unrig fit: --rgi is no option of this command; did you mean --rig?"},
+      {{"fit", "--rig", "rig.toml", "run.csv", "-o", "fit.json", "--verbose=2"}, "unrig fit: --verbose=2 is no option of this command\n"},
+      {{"report", "-x", "fit.json", "-o", "report.html"}, "unrig report: -x is no option"},
+      {{"diagnose", "--rig", "rig.toml", "--hedlout", "a.csv", "b.csv", "-o", "d.json"}, "did you mean --heldout?"},
       {{"correct", "--rig", "rig.toml", "run.csv", "-o", "out.csv"}, "--fit is required"},
       {{"correct", "--rig", "rig.toml", "--fit", "fit.json", "a.csv", "b.csv", "-o", "out.csv"}, "b.csv"},
       {{"correct", "--rig", "rig.toml", "--fit", "fit.json", "a.csv", "-o", "out.csv", "--at-step", "half"}, "half"},

@@ -17,6 +17,7 @@ namespace {
 using test::Finished;
 using test::run_unrig;
 using test::TemporaryDirectory;
+using ::testing::ContainsRegex;
 using ::testing::HasSubstr;
 
 const std::string map = "unrig_import = 1\n[run]\nkind = \"step\"\ndensity = \"998 kg/m^3\"\nspeed = \"0.6 m/s\"\n[time]\nrate = \"500 Hz\"\n[[column]]\nname = \"gauge\"\nsource = \"";
@@ -58,7 +59,7 @@ TEST(ImportCommand, ReadsWhatOctaveWroteForMatlabAndNamesItsOwnFormats) {
         EXPECT_NEAR(run.channel("gauge").value[k], source == "n" ? static_cast<double>(k) : std::sin(static_cast<double>(k) / 7), source == "x" ? 1e-12 : 6e-8);  // digits written; single precision
     }
     const Finished listed = run_unrig(directory, {"import", directory.path(name), "--list"});
-    EXPECT_THAT(listed.out, HasSubstr("data.part(2).n                      1000 samples, UNSCALED"));
+    EXPECT_THAT(listed.out, ContainsRegex("data.part\\(2\\).n +1000 .*UNSCALED"));
     EXPECT_THAT(listed.err, HasSubstr("z is left out: its numbers are complex"));
     EXPECT_THAT(listed.err, HasSubstr("text is left out: it holds no numbers"));
   }
@@ -76,7 +77,7 @@ TEST(ImportCommand, SurvivesAFileAtWhichHdf5BreaksDown) {
   ASSERT_NE(finished.status, -1) << "it ended by a signal";
   if (finished.status != 0) {  // another HDF5 than Debian 12's may get on with it
     EXPECT_EQ(finished.status, 2);
-    EXPECT_THAT(finished.err, HasSubstr("libmatio, which reads it, broke down"));
+    EXPECT_THAT(finished.err, HasSubstr("HDF5, which reads it, broke down"));
   }
 }
 
@@ -87,7 +88,7 @@ TEST(ImportCommand, LeavesOutWhatAsksForAllMemory) {
   EXPECT_LT(finished.peak_memory, 8'000'000) << "KB; 1.1e6 measured, under the sanitizers 3.8e6, without a limit 23e6";
   if (finished.status != 0) {  // under the sanitizers the child's time is over first
     EXPECT_EQ(finished.status, 2);
-    EXPECT_THAT(finished.err, HasSubstr("libmatio, which reads it, broke down"));
+    EXPECT_THAT(finished.err, HasSubstr("HDF5, which reads it, broke down"));
   } else {
     EXPECT_THAT(finished.err, HasSubstr("the variable gauge is left out"));
     EXPECT_THAT(finished.out, AllOf(HasSubstr("time"), Not(HasSubstr("gauge"))));
@@ -104,7 +105,9 @@ TEST(ImportCommand, LeavesOutTextAndNamesItWhereItIsMapped) {
 
   const Finished listed = run_unrig(directory, {"import", file, "--list"});
   EXPECT_THAT(listed.out, HasSubstr("the decimal sign is the comma, 2 channels"));
-  EXPECT_THAT(listed.out, HasSubstr("in s since 12:00:00,010"));
+  EXPECT_THAT(listed.out, HasSubstr("since 12:00:00,010"));
+  EXPECT_THAT(listed.out, HasSubstr("1000 Hz"));
+  EXPECT_EQ(run_unrig(directory, {"import", file}).out, listed.out) << "without anything else, too";
   EXPECT_THAT(listed.out, HasSubstr("left out: \"OK\" is no number (line 2)"));
 
   const Finished unmarked = import_with(map + force);
@@ -144,6 +147,7 @@ TEST(ImportCommand, RefusesAndLeavesNothingBehind) {
                                                              {directory.file("other.txt", "G\n1\n2\n3\n"), "no channel \"F\""},
                                                              {directory.file("short.txt", "F\n1\n2\n"), "rows"},
                                                              {directory.file("twice.txt", "F,F\n1,2\n2,3\n3,4\n"), "more than one channel \"F\""},
+                                                             {directory.file("book.xlsx", "PK\x03\x04"), "Export the sheet as CSV"},
                                                              {directory.file("binary.bin", std::string("\x7f\0\1\2", 4)), "binary"},
                                                              {directory.file("cut.tdms", "TDSm"), "TDMS"},
                                                              {directory.file("cut.mat", "MATLAB 5.0"), "MATLAB"},

@@ -130,6 +130,37 @@ TEST(ReportInABrowser, LoadsDrawsAndZooms) {
   for (const json& colours : found["maps"]) EXPECT_GT(colours, 6) << "a map of fewer colours than values";
 }
 
+/// Behind the page's own script: what became of the labels of the axes.
+constexpr const char* look_at_labels = R"(<script>
+window.addEventListener('load', () => {
+  const labels = [...document.querySelectorAll('.dygraph-ylabel, .dygraph-xlabel')];
+  document.body.textContent = 'FOUND' + JSON.stringify({images: labels.filter((label) => label.querySelector('img')).length, texts: labels.map((label) => label.textContent)}) + 'END';
+});
+</script></body>)";
+
+/// A unit of a result file such as "N<img src=x onerror=...>" ran as a script, through the label of its axis.
+TEST(ReportInABrowser, NamesAndUnitsAreTextAndNoMarkup) {
+  const std::string browser = chromium();
+  if (browser.empty()) GTEST_SKIP() << "no Chromium on this machine; sample_data/setup.sh --optional installs it";
+  const TemporaryDirectory directory;
+  const std::string diagnosis = directory.file("diagnosis.json", test::made_up_diagnosis().dump()), report = directory.path("report.html");
+  ASSERT_EQ(test::run_unrig(directory, {"report", diagnosis, "-o", report}).status, 0);
+  std::string page = read_text(report);
+  const std::string markup = "\\u003cimg src=x onerror=document.title='ran'>";  // as the page writes "<" within its data
+  int labels = 0;
+  for (const std::string key : {"\"x_label\":\"", "\"y_label\":\""})
+    for (std::size_t at = page.find(key); at != std::string::npos; at = page.find(key, at + 1), ++labels) page.insert(at + key.size(), markup);
+  ASSERT_GT(labels, 1);
+  const std::string probed = directory.file("probed.html", replaced(page, "</body>", look_at_labels)), dom = directory.path("dom.html"), log = directory.path("log.txt");
+  ASSERT_EQ(browse(browser, directory, probed, "--window-size=1200,900 --dump-dom", dom, log), 0) << read_text(log);
+  const std::string text = read_text(dom);
+  const std::size_t first = text.find("FOUND{"), last = text.rfind("}END");
+  ASSERT_TRUE(first != std::string::npos && last != std::string::npos) << text.substr(0, 2000) << read_text(log);
+  const std::string found = text.substr(first + 5, last - first - 4);
+  EXPECT_THAT(found, HasSubstr("\"images\":0")) << found;
+  EXPECT_THAT(found, HasSubstr("img src=x")) << "it is shown as it stands";
+}
+
 /// Behind the page's own script: what stands on the paper, plot by plot, and what stands in the window again after it.
 constexpr const char* look_at_paper = R"(<script>
 for (const moment of ['beforeprint', 'afterprint']) window.addEventListener(moment, () => {

@@ -384,6 +384,7 @@ TEST(Report, RefusesWhatIsNoResult) {
       {directory.file("types.json", bad_diagnosis.dump()), "types.json"},
       {directory.file("indicial.csv", "semichords,indicial,indicial_std\n1,0.5,0.01\n0.5,0.6,0.01\n"), "indicial.csv:3"},
       {directory.file("corrected.csv", "time [s],normal_force_std [N]\n0,1\n1,2\n"), "gauge"},
+      {directory.file("markup.csv", "time [s],gauge [N<img src=x onerror=alert(1)>],normal_force_std [N]\n0,1,2\n1,1,2\n"), "markup.csv:1: the column \"gauge\" has the unknown unit"},
       {test::null_campaign("step_a.csv"), "fit.json"}};
   for (const auto& [file, complaint] : bad) {
     const Finished finished = run_unrig(directory, {"report", file, "-o", directory.path("report.html")});

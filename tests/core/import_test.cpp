@@ -1,4 +1,4 @@
-// The mapping from a laboratory's file to a run file, text tables, and MATLAB files written by libmatio.
+// The mapping from a laboratory's file to a run file, text tables, LabVIEW's, and MATLAB files written by libmatio and h5py.
 
 #include "core/import/import.h"
 
@@ -7,11 +7,14 @@
 #include <matio.h>
 
 #include <cmath>
+#include <cstring>
 #include <map>
 #include <tuple>
 
 #include "core/error.h"
+#include "core/import/channel_list.h"
 #include "core/import/delimited.h"
+#include "core/import/lvm.h"
 #include "core/run.h"
 #include "tests/support/temporary_directory.h"
 
@@ -19,6 +22,8 @@ namespace unrig {
 namespace {
 
 using ::testing::AllOf;
+using ::testing::Contains;
+using ::testing::ContainsRegex;
 using ::testing::Each;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
@@ -119,6 +124,100 @@ TEST(Import, WarnsOfNamesThatNoCommandReads) {
   EXPECT_THAT(warnings("gauge2", "gauge"), Each(Not(HasSubstr("did you mean")))) << "a second one";
   EXPECT_THAT(warnings("heave", "pitch"), ElementsAre(neither));
   EXPECT_THAT(warnings("temperature", "alpha"), IsEmpty());
+}
+
+/// Without a table [time] the sampling is the channels' own, and must be one for all.
+TEST(Import, TakesChannelsOfOneClockOnly) {
+  const std::string map = head.substr(0, head.find("calibration")) + "[[column]]\nname = \"alpha\"\nsource = \"angle\"\n[[column]]\nname = \"gauge\"\nsource = \"bridge\"\n";
+  EXPECT_THAT(complaint([&] { import_recording(recording(), map, "map.toml"); }), "nothing");
+  Recording faster = recording(), later = recording();
+  faster.channels[1].step = 0.02;
+  later.channels[1].start = 1;
+  for (const Recording& r : {faster, later})
+    EXPECT_THAT(complaint([&] { import_recording(r, map, "map.toml"); }), HasSubstr("\"angle\" and \"bridge\" are sampled differently; wanted channels of one clock"));
+}
+
+TEST(Import, FindsAChannelByWhatTheFileCallsItElsewhere) {
+  Recording r = recording();
+  r.channels[1].label = "load cell";
+  const std::string map = head + "[time]\nrate = \"100 Hz\"\n[[column]]\nname = \"gauge\"\nsource = \"load cell\"\n[[column]]\nname = \"alpha\"\nsource = \"angle\"\n";
+  EXPECT_THAT(import_recording(r, map, "map.toml").columns, Contains(HasSubstr("gauge [mV] from bridge")));
+  r.channels[2].label = "load cell";
+  EXPECT_THAT(complaint([&] { import_recording(r, map, "map.toml"); }), HasSubstr("holds no channel \"load cell\"")) << "two of them";
+}
+
+TEST(Import, ListsRangeMeanAndNoise) {
+  Recording r{"lab.tdms", "TDMS", {}, {}};
+  RecordedChannel force{"G/Force", "N", {}, "", 0.002, 0};
+  for (int k = 0; k < 4000; ++k) force.value.push_back(10 + (k % 2 == 0 ? 0.5 : -0.5) * std::sqrt(12.0) * std::fmod(k * 0.6180339887498949, 1.0));  // no signal of its own that is slow
+  force.value[7] = std::nan("");
+  r.channels = {force, {"Clock", "ms", {}, "", 0, 0}, {"counts", "", {5, 5, 5}, "no scale", 0, 0}};
+  for (int k = 0; k < 100; ++k) r.channels[1].value.push_back(4 * k);
+  const std::string list = channel_list(r);
+  EXPECT_THAT(list, HasSubstr("lab.tdms: TDMS, 3 channels"));
+  EXPECT_THAT(list, ContainsRegex("G/Force +4000 +N +500 Hz +8\\.[0-9]+ +11\\.[0-9]+ +(9\\.9|10)[0-9.]* +[0-9.]+  1 missing"));
+  EXPECT_THAT(list, ContainsRegex("Clock +100 +ms +250 Hz +0 +396 +198 +-"));
+  EXPECT_THAT(list, ContainsRegex("counts +3 +- +250 Hz +5 +5 +5 +0  UNSCALED: no scale"));
+}
+
+TEST(Import, SaysWhatToDoWithAWorkbook) {
+  const TemporaryDirectory directory;
+  for (const std::string& begin : {std::string("PK\x03\x04\x14\0\x06\0", 8), std::string("\xD0\xCF\x11\xE0\xA1\xB1", 6)})
+    EXPECT_THAT(complaint([&] { read_recording(directory.file("run.xlsx", begin), "unrig_import = 1\n", "map.toml"); }), AllOf(HasSubstr("run.xlsx: this is an Excel workbook"), HasSubstr("Export the sheet as CSV")));
+}
+
+// ------------------------------------------------------------------------------------------------------ LabVIEW measurement files
+
+const std::string lvm_head = "LabVIEW Measurement\t\nWriter_Version\t2\nReader_Version\t2\nSeparator\tTab\nDecimal_Separator\t.\nMulti_Headings\tNo\nX_Columns\tNo\nTime_Pref\tAbsolute\n"
+                             "Date\t2026/11/23\nTime\t12:00:00,5\n***End_of_Header***\t\n\t\nChannels\t2\t\t\nSamples\t4\t4\t\nDate\t2026/11/23\t2026/11/23\t\nY_Unit_Label\tdeg\tVolts\t\n"
+                             "X_Dimension\tTime\tTime\t\nX0\t0.5\t0.5\t\nDelta_X\t0.002000\t0.002000\t\n***End_of_Header***\t\t\t\n";
+const std::string lvm_table = "X_Value\tAngle\tBridge\tComment\n\t1.5\t0.25\tbegin\n\t2.5\t0.5\n\t3.5\t0.75\n\t4.5\t1\n";
+
+TEST(Lvm, ReadsUnitsAndSamplingFromItsHeaders) {
+  const Recording r = read_lvm(lvm_head + lvm_table, "f.lvm");
+  ASSERT_EQ(r.channels.size(), 2u);
+  EXPECT_EQ(r.channels[0].name, "Angle");
+  EXPECT_EQ(r.channels[0].unit, "deg");
+  EXPECT_EQ(r.channels[0].value, (Values{1.5, 2.5, 3.5, 4.5}));
+  EXPECT_EQ(r.channels[1].unit, "Volts");
+  EXPECT_EQ(r.channels[1].value, (Values{0.25, 0.5, 0.75, 1}));
+  EXPECT_EQ(r.channels[1].step, 0.002);
+  EXPECT_EQ(r.channels[1].start, 0.5);
+}
+
+TEST(Lvm, ReadsItsOtherForms) {
+  const auto with = [](std::string text, const std::vector<std::pair<std::string, std::string>>& changes) {
+    for (const auto& [what, by] : changes)
+      for (std::size_t at = 0; (at = text.find(what, at)) != std::string::npos; at += by.size()) text.replace(at, what.size(), by);
+    return text;
+  };
+  const std::string timed = with(lvm_head, {{"X_Columns\tNo", "X_Columns\tOne"}}) + "X_Value\tAngle\tBridge\tComment\n0.500\t1.5\t0.25\n0.502\t2.5\t0.5\n0.504\t3.5\t0.75\n";
+  const Recording one = read_lvm(timed, "f.lvm");
+  ASSERT_EQ(one.channels.size(), 3u);
+  EXPECT_EQ(one.channels[0].unit, "s");
+  EXPECT_EQ(one.channels[1].unit, "deg");
+  EXPECT_EQ(one.channels[1].step, 0.002);
+  EXPECT_EQ(read_lvm(with(timed, {{"0.504", "0.604"}}), "f.lvm").channels[1].step, 0) << "the column of times is not that of Delta_X";
+
+  const Recording german = read_lvm(with(with(lvm_head, {{"Decimal_Separator\t.", "Decimal_Separator\t,"}, {"0.002000", "0,002000"}, {"0.5\t", "0,5\t"}}) + with(lvm_table, {{".", ","}}), {{"\n", "\r\n"}}), "f.lvm");
+  EXPECT_EQ(german.channels[1].value, (Values{0.25, 0.5, 0.75, 1}));
+  EXPECT_EQ(german.channels[1].step, 0.002);
+
+  const Recording commas = read_lvm(with(lvm_head + lvm_table, {{"Separator\tTab", "Separator\tComma"}, {"12:00:00,5", "12:00:00"}, {"\t", ","}}), "f.lvm");
+  EXPECT_EQ(commas.channels[1].value, (Values{0.25, 0.5, 0.75, 1}));
+
+  const Recording several = read_lvm(lvm_head + lvm_table + "\n" + lvm_head.substr(lvm_head.find("Channels")) + lvm_table, "f.lvm");
+  EXPECT_EQ(several.channels[1].value.size(), 4u);
+  EXPECT_THAT(several.warnings, ElementsAre(HasSubstr("several tables")));
+
+  const Recording own_times = read_lvm(with(lvm_head, {{"X_Columns\tNo", "X_Columns\tMulti"}, {"deg\tVolts", "deg\t\tVolts"}}) + "X_Value\tAngle\tX_Value\tBridge\tComment\n0.5\t1\t0.5\t7\n0.502\t2\t0.502\t8\n", "f.lvm");
+  ASSERT_EQ(own_times.channels.size(), 4u);
+  EXPECT_EQ(own_times.channels[2].name, "X_Value of Bridge");
+  EXPECT_EQ(own_times.channels[3].unit, "Volts");
+
+  EXPECT_THAT(complaint([&] { read_lvm(lvm_head.substr(0, 300), "f.lvm"); }), HasSubstr("does not end"));
+  EXPECT_THAT(complaint([&] { read_lvm(lvm_head, "f.lvm"); }), HasSubstr("f.lvm:"));
+  EXPECT_THAT(complaint([&] { read_lvm(lvm_head + with(lvm_table, {{"0.75", "0.75\t1\t2"}}), "f.lvm"); }), HasSubstr("f.lvm:25: the row has")) << "lines are the file's";
 }
 
 TEST(Delimited, FindsDelimiterAndUnits) {
@@ -356,6 +455,62 @@ TEST(Mat, ReadsBothVersions) {
     EXPECT_THAT(by_name["counts"].raw, HasSubstr("integers"));
     EXPECT_EQ(by_name["data.gauge"].value, (Values{1, 2, 3}));
   }
+}
+
+/// The names of the columns in a cell array, and a matrix that stands on its side.
+TEST(Mat, NamesColumnsByTheListsBesideThem) {
+  const TemporaryDirectory directory;
+  for (const mat_ft version : {MAT_FT_MAT5, MAT_FT_MAT73}) {
+    const std::string path = directory.path("names.mat");
+    mat_t* file = Mat_CreateVer(path.c_str(), nullptr, version);
+    ASSERT_NE(file, nullptr);
+    double matrix[]{0, 10, 1, 20, 2, 30};  // 2 x 3, column by column
+    std::size_t wide[]{2, 3}, two[]{1, 2};
+    const auto cell = [&](const char* name, const char* first, const char* second) {
+      matvar_t* list = Mat_VarCreate(name, MAT_C_CELL, MAT_T_CELL, 2, two, nullptr, 0);
+      int at = 0;
+      for (const char* text : {first, second}) {
+        std::size_t length[]{1, std::strlen(text)};
+        Mat_VarSetCell(list, at++, Mat_VarCreate(nullptr, MAT_C_CHAR, MAT_T_UTF8, 2, length, const_cast<char*>(text), 0));
+      }
+      return list;
+    };
+    for (matvar_t* v : {Mat_VarCreate("data", MAT_C_DOUBLE, MAT_T_DOUBLE, 2, wide, matrix, 0), cell("names", "angle", "load cell"), cell("units", "deg", "N")}) {
+      EXPECT_EQ(Mat_VarWrite(file, v, MAT_COMPRESSION_NONE), 0);
+      Mat_VarFree(v);
+    }
+    Mat_Close(file);
+    const Recording r = recording_in(path);
+    ASSERT_EQ(r.channels.size(), 2u);
+    EXPECT_EQ(r.channels[0].name, "data(1,:)");
+    EXPECT_EQ(r.channels[0].label, "angle");
+    EXPECT_EQ(r.channels[0].unit, "deg");
+    EXPECT_EQ(r.channels[0].value, (Values{0, 1, 2}));
+    EXPECT_EQ(r.channels[1].label, "load cell");
+    EXPECT_EQ(r.channels[1].unit, "N");
+    EXPECT_EQ(r.channels[1].value, (Values{10, 20, 30}));
+  }
+}
+
+/// Written by h5py 3.7 as hdf5storage does: text attributes padded with NULs, at which libmatio finds no variable. The second has no sign of MATLAB in it.
+TEST(Mat, ReadsWhatH5pyWrote) {
+  const auto corpus = [](const std::string& name) { return recording_in(std::string(UNRIG_SOURCE_DIR) + "/tests/fuzz/corpus/mat73/" + name); };
+  std::map<std::string, RecordedChannel> by_name;
+  for (const RecordedChannel& c : corpus("h5py.mat").channels) by_name[c.name] = c;
+  ASSERT_EQ(by_name.size(), 5u);
+  EXPECT_EQ(by_name["force"].value.size(), 40u);
+  EXPECT_NEAR(by_name["force"].value[10], std::sin(1.0), 1e-15);
+  EXPECT_THAT(by_name["counts"].raw, HasSubstr("integers"));
+  EXPECT_EQ(by_name["rec.data(3,:)"].label, "load cell");
+  EXPECT_EQ(by_name["rec.data(3,:)"].unit, "N");
+  EXPECT_NEAR(by_name["rec.data(3,:)"].value[39], 7 - 0.078, 1e-15);
+
+  by_name.clear();
+  for (const RecordedChannel& c : corpus("h5py_without_matlab.h5").channels) by_name[c.name] = c;
+  ASSERT_EQ(by_name.size(), 3u);
+  EXPECT_EQ(by_name["gauge"].value.size(), 40u);
+  EXPECT_EQ(by_name["both(:,2)"].label, "gauge");
+  EXPECT_EQ(by_name["both(:,2)"].value, by_name["gauge"].value);
 }
 
 TEST(Mat, RefusesWhatCannotBeRead) {

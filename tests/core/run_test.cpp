@@ -4,6 +4,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <chrono>
 #include <cmath>
 #include <functional>
 #include <limits>
@@ -11,6 +12,7 @@
 #include <string>
 #include <vector>
 
+#include "core/run_limits.h"
 #include "tests/support/shared_data.h"
 #include "tests/support/temporary_directory.h"
 
@@ -110,6 +112,12 @@ TEST(Run, AbsentColumnsAreNamed) {
   }
 }
 
+std::string with_returns(std::string text) {
+  for (char& c : text)
+    if (c == '\n') c = '\r';
+  return text;
+}
+
 TEST(Run, FormsOfTextThatMeanTheSame) {
   const unrig::Run plain = read(head + small_table);
   std::string crlf = head + small_table;
@@ -122,6 +130,9 @@ TEST(Run, FormsOfTextThatMeanTheSame) {
       head + "# # a remark\n#\n\n" + small_table,
       head + replaced(small_table, "0.1,2,20", " 0.1 ,\t+2.0e0, 2e1 "),
       head + replaced(small_table, "time [s],alpha [deg]", "\"time [s]\" , alpha[deg]"),
+      head + replaced(small_table, "alpha [deg],gauge [N]", "alpha (deg),\"gauge (N)\""),  // as spreadsheets write units
+      head + replaced(small_table, "0.1,2,20", "\"0.1\", \"2\" ,\" 20 \""),
+      with_returns(head + small_table),  // old Macintosh programs
   };
   for (const std::string& form : forms) {
     SCOPED_TRACE(form);
@@ -301,6 +312,51 @@ TEST(RunTimes, ARepeatedStampAfterALateOneIsSpread) {
   EXPECT_THAT(run.warnings, ElementsAre(AllOf(HasSubstr(":27: "), HasSubstr("repeat"))));
 }
 
+/// Where a logger wrote a row twice the other rows are the recording, on their own grid. Interpolated to a grid of one row more, all of them
+/// lay up to half a step off: the chi-square of a step rose from 1 to 2.09.
+TEST(RunTimes, ARowThatStandsTwiceIsLeftOut) {
+  const int count = 400;
+  for (const double other_reading : {0.0, 0.5})  // the same readings, or others at the same instant
+    for (const int row : {0, 200, 399}) {
+      SCOPED_TRACE(row);
+      std::string text = head + "time [s],gauge [N]\n";
+      for (int k = 0; k < count; ++k) {
+        text += fmt::format("{:.3f},{:.9g}\n", 0.002 * k, line(0.002 * k));
+        if (k == row) text += fmt::format("{:.3f},{:.9g}\n", 0.002 * k, line(0.002 * k) + other_reading);
+      }
+      const unrig::Run run = read(text);
+      EXPECT_FALSE(run.resampled);
+      EXPECT_NEAR(run.dt, 0.002, 1e-12);
+      ASSERT_EQ(run.samples(), count);
+      for (int k = 0; k < count; ++k) EXPECT_NEAR(run.channel("gauge").value[k], line(0.002 * k), 1e-8) << k;  // nine digits were written
+      EXPECT_THAT(run.warnings, ElementsAre(AllOf(HasSubstr(fmt::format("step_a.csv:{}: 1 row(s) repeat the time", 7 + row)), HasSubstr("left out"))));
+    }
+}
+
+TEST(RunTimes, WhatFollowsALeftOutRowKeepsItsLine) {
+  const std::string good = head + "time [s],gauge [N]\n0.000,1\n0.002,2\n0.002,2\n0.004,3\n0.006,4\n0.008,5\n0.010,6\n0.012,7\n";
+  EXPECT_EQ(read(good).samples(), 7);
+  EXPECT_THAT(refusal(replaced(good, "0.010,6\n", "")), AllOf(HasSubstr("step_a.csv:12: "), HasSubstr("gap from 0.008 to 0.012 s")));
+}
+
+TEST(RunTimes, StampsTooCoarseForTheirSamplesAreNoRepeatedRows) {
+  std::string text = head + "time [s],gauge [N]\n";  // 100 Hz printed to 20 ms: every stamp stands in two rows, of different readings
+  for (int k = 0; k < 101; ++k) text += fmt::format("{:.2f},{}\n", 0.02 * ((k + 1) / 2), k);
+  const unrig::Run run = read(text);
+  EXPECT_EQ(run.samples(), 101);
+  EXPECT_NEAR(run.dt, 0.01, 1e-12);
+}
+
+TEST(RunTimes, ASampleThatIsStampedEarlyIsMoved) {
+  std::vector<double> times = uniform_times(50, 0.01);
+  times[21] = times[20];
+  const unrig::Run run = read(run_of(times, line, 4));
+  EXPECT_FALSE(run.resampled);
+  EXPECT_EQ(run.samples(), 50);
+  EXPECT_NEAR(run.dt, 0.01, 1e-15);
+  EXPECT_THAT(run.warnings, ElementsAre(AllOf(HasSubstr(":27: "), HasSubstr("spread"))));
+}
+
 TEST(RunTimes, JitterThroughoutAllowsLongerIntervals) {
   std::vector<double> times = uniform_times(200, 0.01);
   for (std::size_t k = 0; k < times.size(); ++k) times[k] += 0.002 * std::sin(7.0 * static_cast<double>(k));
@@ -369,6 +425,26 @@ TEST(Run, WhatCannotBeUsedIsNamedWithItsLine) {
       {"row too long", replaced(good, "0.1,2,20", "0.1,2,20,4"), "step_a.csv:7: the row has 4 cells; wanted 3"},
       {"cut off", good.substr(0, good.size() - 4), "step_a.csv:8: the file ends in the middle of a row"},
       {"blank line between rows", replaced(good, "0.1,", "\n0.1,"), "step_a.csv:7: a blank line"},
+      {"Latin-1", replaced(good, "[deg]", "[\xB0]"), "step_a.csv:5: the file is not UTF-8: the byte 0xB0 here is \"\xC2\xB0\" in Latin-1; wanted UTF-8"},
+      {"Latin-1 in the meta data", replaced(good, "# speed", "# medium = \"L\xF6sung\"\n# speed"), "step_a.csv:4: the file is not UTF-8"},
+      {"Latin-1 in a cell", replaced(good, "2,20", "2,\xB5"), "step_a.csv:7: the column \"gauge\" holds \"\xC2\xB5\""},
+      {"decimal comma in quotes", replaced(good, "2,20", "2,\"2,0\""), "step_a.csv:7: the column \"gauge\" holds \"2,0\""},
+      {"an Excel workbook", std::string("PK\x03\x04\x14\0", 6), "step_a.csv: this is an Excel workbook (.xlsx)"},
+      {"TDMS", "TDSm", "this is an NI TDMS file; wanted a run file, with `# unrig_run = 1` at its head. `unrig import` makes a run file of it."},
+      {"a rig file", "# the rig\nunrig_rig = 1\nname = \"rig\"\n", "step_a.csv:1: this is a rig file; wanted a run file, with `# unrig_run = 1` at its head. Have two files been exchanged"},
+      {"a mapping", "unrig_import = 1\n", "this is a mapping"},
+      {"a result", "{\n  \"unrig\": \"fit\"\n}", "this is a result of unrig (JSON)"},
+      {"another binary file", std::string("\x7f\0\1\2", 4), "binary file"},
+      // What no instrument reads and no fluid is (core/run_limits.h has the sources).
+      {"a fluid denser than osmium", replaced(good, "998.2 kg/m^3", "1e30 kg/m^3"), "step_a.csv:3: density is 1e+30 kg/m^3; wanted at most 22590, that of osmium"},
+      {"faster than light", replaced(good, "2 ft/s", "1e300 m/s"), "step_a.csv:4: speed is 1e+300 m/s; wanted at most 2.99792e+08, the speed of light"},
+      {"readings whose squares overflow", head + "time [s],alpha [deg],gauge [N]\n0,1,1e308\n0.1,2,-1e308\n0.2,3,1e308\n", "the column \"gauge\""},
+      {"a calibration that makes such", replaced(replaced(good, "[N]", "[V]"), "# speed", "# calibration = \"1e200 N/V\"\n# speed"),
+       "step_a.csv:7: the column \"gauge\" reads 10 V; wanted a reading of an instrument, within 3.4e+38 N"},
+      {"readings whose squares vanish", head + "time [s],alpha [deg],gauge [N]\n0,1,1e-300\n0.1,2,2e-300\n0.2,3,3e-300\n", "step_a.csv:5: the column \"gauge\" varies by 2e-300 N only"},
+      {"times beyond all time", head + "time [s],alpha [deg]\n0,1\n1e307,2\n2e307,3\n", "step_a.csv:7: the time is 1e+307 s; wanted a time within 4.4e+17 s"},
+      {"samples closer than any instrument takes them", head + "time [s],alpha [deg]\n0,1\n1e-300,2\n2e-300,3\n", "step_a.csv:5: the samples are 1e-300 s apart"},
+      {"samples further apart than a year", head + "time [s],alpha [deg]\n0,1\n1e8,2\n2e8,3\n", "step_a.csv:5: the samples are 1e+08 s apart"},
       {"text", replaced(good, "2,20", "2,abc"), "step_a.csv:7: the column \"gauge\" holds \"abc\""},
       {"number with a tail", replaced(good, "2,20", "2,20N"), "step_a.csv:7: the column \"gauge\" holds \"20N\""},
       {"infinity", replaced(good, "2,20", "2,inf"), "step_a.csv:7: the column \"gauge\" holds \"inf\""},
@@ -381,6 +457,46 @@ TEST(Run, WhatCannotBeUsedIsNamedWithItsLine) {
       {"nothing but text beside time", head + "time [s],note [1]\n0,a\n1,b\n2,c\n", "no column but \"time\" holds numbers"},
   };
   for (const Unusable& one : cases) EXPECT_THAT(refusal(one.text), HasSubstr(one.says)) << one.what;
+}
+
+/// A dead encoder was "a transform needs finite samples" after ten seconds.
+TEST(Run, WhatDrivesARunOfItsKindMustChange) {
+  const auto refused = [](const std::string& text) -> std::string {
+    try {
+      check_what_drives(read(text));
+    } catch (const InputError& error) {
+      return error.what();
+    }
+    return "no error";
+  };
+  const std::string forced = replaced(head, "step", "forced"), moved = replaced(head, "step", "moved"), mount = "time [s],mount_velocity [m/s],mount_acceleration [m/s^2],gauge [N]\n";
+  EXPECT_THAT(refused(head + "time [s],alpha [deg],gauge [N]\n0,2.07,10\n0.1,2.07,20\n0.2,2.07,30\n"),
+              AllOf(HasSubstr("step_a.csv:5: the column \"alpha\" never changes, it is 2.07 deg throughout; wanted what drives a run of the kind \"step\". "), HasSubstr("dead encoder")));
+  EXPECT_THAT(refused(head + "time [s],alpha [deg],weight\n0,2,0\n0.1,3,1\n0.2,3,1\n0.3,,1\n"), HasSubstr("\"alpha\" never changes")) << "where it counts";
+  EXPECT_THAT(refused(head + "time [s],alpha [deg],weight\n0,2,0\n0.1,,1\n0.2,,1\n"), HasSubstr("the column \"alpha\" has no number in a row that counts"));
+  EXPECT_THAT(refused(forced + "time [s],force [N],gauge [N]\n0,0,10\n0.1,0,20\n0.2,0,30\n"), HasSubstr("step_a.csv:5: the column \"force\" never changes, it is 0 N"));
+  EXPECT_THAT(refused(moved + mount + "0,1,0,10\n0.1,1,0,20\n0.2,1,0,30\n"), HasSubstr("\"mount_velocity\" never changes"));
+  EXPECT_THAT(refused(moved + mount + "0,1,0,10\n0.1,1,1,20\n0.2,1,0,30\n"), "no error") << "one of two is enough";
+  EXPECT_THAT(refused(replaced(head, "step", "pluck") + "time [s],alpha [deg],gauge [N]\n0,2,10\n0.1,2,20\n0.2,2,30\n"), "no error") << "an airfoil at a constant angle";
+}
+
+TEST(Run, AColumnThatNoInstrumentReadAndNobodyNeedsIsLeftOut) {
+  const unrig::Run run = read(head + "time [s],alpha [deg],odd [V]\n0,1,1e-300\n0.1,2,2e-300\n0.2,3,3e-300\n");
+  EXPECT_EQ(run.find("odd"), nullptr);
+  EXPECT_THAT(run.warnings, ElementsAre(AllOf(HasSubstr("step_a.csv:5: the column \"odd\" varies by 2e-300 V only"), HasSubstr("It is left out."))));
+}
+
+/// Each name was compared with each: minutes.
+TEST(Run, AHundredThousandColumnsAreReadInSeconds) {
+  std::string text = head + "time [s],alpha [deg]", row[3];
+  for (int c = 0; c < 100'000; ++c) {
+    text += fmt::format(",channel {} [odd{}]", c, c % 10);
+    for (std::string& cells : row) cells += ",1.5";
+  }
+  for (int k = 0; k < 3; ++k) text += fmt::format("\n{},{}", k, k) + row[k];
+  const auto begin = std::chrono::steady_clock::now();
+  EXPECT_EQ(read(text + "\n").channels.size(), 100'001u);
+  EXPECT_LT(std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count(), 20) << "0.2 s measured";
 }
 
 TEST(Run, AFileThatIsNotThere) { EXPECT_THROW(read_run("/nonexistent/run.csv"), InputError); }

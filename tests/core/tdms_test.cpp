@@ -174,6 +174,10 @@ TEST(Tdms, AppliesEachKindOfScale) {
   EXPECT_DOUBLE_EQ(scaled({three, property(0, "Scale_Type", std::string("Linear")), property(0, "Linear_Slope", 2.0), property(0, "Linear_Y_Intercept", 0.0),
                            property(1, "Scale_Type", std::string("Linear")), property(1, "Linear_Slope", 1.0), property(1, "Linear_Y_Intercept", 1.0), property(2, "Scale_Type", std::string("Add")),
                            property(2, "Add_Left_Operand_Input_Source", std::int32_t(0)), property(2, "Add_Right_Operand_Input_Source", std::int32_t(1))}, 5), 16);
+  // (x + 1) - 2 x: "LabVIEW subtracts the left operand from the right one" (npTDMS, SubtractScaling, as observed in LabVIEW).
+  EXPECT_DOUBLE_EQ(scaled({three, property(0, "Scale_Type", std::string("Linear")), property(0, "Linear_Slope", 2.0), property(0, "Linear_Y_Intercept", 0.0),
+                           property(1, "Scale_Type", std::string("Linear")), property(1, "Linear_Slope", 1.0), property(1, "Linear_Y_Intercept", 1.0), property(2, "Scale_Type", std::string("Subtract")),
+                           property(2, "Subtract_Left_Operand_Input_Source", std::int32_t(0)), property(2, "Subtract_Right_Operand_Input_Source", std::int32_t(1))}, 5), -4);
   // A quarter bridge: -4 V / (GF (1 + 2 V)) with V = 6.8827 mV / 2.5 V, by hand.
   EXPECT_NEAR(scaled({one, property(0, "Scale_Type", std::string("Strain")), property(0, "Strain_Configuration", std::int32_t(10271)), property(0, "Strain_Gage_Factor", 2.1),
                       property(0, "Strain_Voltage_Excitation", 2.5)}, 0.0068827), -5.215246e-3, 5e-10);

@@ -46,6 +46,21 @@ TEST(TextFile, WritesWhatItReads) {
   EXPECT_EQ(read_text(directory.path("a.txt")), "");
 }
 
+/// It was read without end.
+TEST(TextFile, ADeviceWithoutAnEndIsRefused) {
+  const auto said = [](const std::string& path) -> std::string {
+    try {
+      read_text(path);
+    } catch (const InputError& error) {
+      return error.what();
+    }
+    return "no error";
+  };
+  EXPECT_THAT(said("/dev/zero"), HasSubstr("/dev/zero: the file cannot be read: no end of it"));
+  EXPECT_THAT(said("/dev/urandom"), HasSubstr("no end of it"));
+  EXPECT_EQ(read_text("/dev/null"), "");
+}
+
 TEST(TextFile, PiecesBecomeOneTextWhateverTheirSize) {
   const TemporaryDirectory directory;
   const std::string path = directory.path("pieces.txt");

@@ -275,6 +275,36 @@ TEST(MotionWindows, CoverASoftStartAndAShaftThatNeverStops) {
   EXPECT_GE(windows[0].knots.last, run.samples() - 2) << "free to the end";
 }
 
+/// "A window of the motion needs knots inside the record": the knots of a long record lie further apart than its shortest motions last.
+TEST(MotionWindows, OfAShaftThatWandersHaveAKnotEach) {
+  unrig::Run run;
+  run.kind = RunKind::step;
+  run.dt = 0.002;
+  run.channels.push_back({"alpha", "rad", "rad", 1, VectorXd(100'000)});
+  std::mt19937_64 random(1);
+  std::normal_distribution<double> step(0, 1.7e-4);
+  double angle = 0;
+  for (double& alpha : run.channels[0].value) alpha = angle += step(random);
+  const Windows windows = motion_windows(run);
+  ASSERT_FALSE(windows.empty());
+  for (std::size_t w = 0; w < windows.size(); ++w) {
+    EXPECT_GE(windows[w].knots.length(), windows[w].stride);
+    EXPECT_EQ(windows[w].stride, windows[0].stride);
+    if (w > 0) {
+      EXPECT_GT(windows[w].knots.first, windows[w - 1].knots.last);
+    }
+  }
+  EXPECT_NO_THROW(MotionBasis(run.samples(), run.dt, windows));
+}
+
+/// They never change, and the fit after ten seconds of search ended in "a transform needs finite samples".
+TEST(RunResidual, RefusesWhatDrivesItsRunAndNeverChanges) {
+  Case c = pluck({"gauge"});
+  c.run.kind = RunKind::step;
+  c.run.channels.push_back({"alpha", "rad", "rad", 1, VectorXd::Constant(c.run.samples(), 0.03)});
+  EXPECT_THROW(RunResidual(*c.model, c.run, motion_windows(c.run)), InputError);
+}
+
 TEST(RunResidual, RefusesARunThatDoesNotBelong) {
   Case c = pluck({"gauge"});
   for (Channel& channel : c.run.channels)

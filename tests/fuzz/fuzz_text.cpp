@@ -1,4 +1,4 @@
-// Text tables, as they are and as several [format] have them: a recording or InputError, and every channel as long as the others and no longer than the file has lines.
+// Text tables and LabVIEW's, as they are and as several [format] have them: a recording or InputError, and every channel as long as the others and no longer than the file has lines.
 #include <algorithm>
 #include <cstdint>
 #include <cstdlib>
@@ -6,13 +6,14 @@
 
 #include "core/error.h"
 #include "core/import/delimited.h"
+#include "core/import/lvm.h"
 
 namespace {
 
 void read(const std::string& text, const unrig::DelimitedFormat& format) {
   const auto lines = static_cast<std::size_t>(std::count_if(text.begin(), text.end(), [](char c) { return c == '\n' || c == '\r'; })) + 1;
   try {
-    const unrig::Recording r = unrig::read_delimited(text, "fuzz.txt", format);
+    const unrig::Recording r = unrig::is_lvm(text) ? unrig::read_lvm(text, "fuzz.lvm", format) : unrig::read_delimited(text, "fuzz.txt", format);
     if (r.channels.empty()) std::abort();
     for (const unrig::RecordedChannel& channel : r.channels)
       if (channel.value.size() != r.channels.front().value.size() || channel.value.empty() || channel.value.size() > lines) std::abort();
