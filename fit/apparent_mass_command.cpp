@@ -5,6 +5,7 @@
 
 #include "core/command.h"
 #include "core/given_files.h"
+#include "core/provenance.h"
 #include "core/text_file.h"
 #include "fit/apparent_mass.h"
 #include "fit/apparent_mass_files.h"
@@ -38,7 +39,7 @@ int apparent_mass_command(int argc, char** argv) {
   const ApparentMassResult result = apparent_mass(problem);
   progress.clear();
   for (const std::string& warning : result.warnings) warn(warning);
-  write_text(output, to_json(result));
+  write_text(output, to_json(result, provenance_of(argc, argv)));
   fmt::print("{}", report(result));
   return exit_done;
 }
