@@ -100,12 +100,12 @@ void take_out_noise_of_the_angle(const Rig& rig, Run& run) {
   warn(fmt::format("{}: the angle is a measurement, with a noise of {:.2g} deg; simulated is the smooth motion that it says (--as-recorded: every reading as it is)", run.file, motion->noise / degree));
 }
 
-struct Given {
+struct ToSimulate {
   SimulateProblem problem;
   MadeBy made_by;
 };
 
-Given problem_of(const Options& options, const Provenance& made) {
+ToSimulate problem_of(const Options& options, const Provenance& made) {
   const Rig rig = read_rig(options.rig);
   for (const std::string& warning : rig.warnings) warn(warning);
   Run run = read_run(options.run);
@@ -211,7 +211,7 @@ int simulate_command(int argc, char** argv) {
   }
 
   check_outputs({{"-o", options.output}}, {options.rig, options.run, options.fit, options.indicial});
-  const Given given = problem_of(options, provenance_of(argc, argv));
+  const ToSimulate given = problem_of(options, provenance_of(argc, argv));
   const SimulateProblem& problem = given.problem;
   Progress progress;
   progress("simulating " + options.run);
