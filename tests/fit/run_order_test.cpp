@@ -18,10 +18,10 @@ namespace unrig {
 namespace {
 
 using nlohmann::json;
-using unrig::Run;
 
-std::vector<Run> runs_of(const std::string& campaign, const std::vector<std::string>& names) {
-  std::vector<Run> runs;
+
+std::vector<unrig::Run> runs_of(const std::string& campaign, const std::vector<std::string>& names) {
+  std::vector<unrig::Run> runs;
   for (const std::string& name : names) runs.push_back(read_run(test::source_path("sample_data/campaigns/" + campaign + "/" + name + ".csv")));
   return runs;
 }
@@ -40,9 +40,9 @@ std::map<std::string, json> by_name(const json& fit) {
   return all;
 }
 
-std::vector<std::string> files_of(const std::vector<Run>& runs) {
+std::vector<std::string> files_of(const std::vector<unrig::Run>& runs) {
   std::vector<std::string> files;
-  for (const Run& run : runs) files.push_back(run.file);
+  for (const unrig::Run& run : runs) files.push_back(run.file);
   return files;
 }
 
@@ -104,12 +104,12 @@ TEST(RunOrder, ShufflingTheRunsChangesNoDigitOfADiagnosis) {
 }
 
 TEST(RunOrder, GoesByWhatTheRunsHold) {
-  const std::vector<Run> runs = runs_of("null", {"step_c", "step_b", "step_a", "wet_pluck", "dry_pluck"});
+  const std::vector<unrig::Run> runs = runs_of("null", {"step_c", "step_b", "step_a", "wet_pluck", "dry_pluck"});
   EXPECT_EQ(order_of_search(runs), (std::vector<std::size_t>{4, 3, 2, 1, 0}));
-  std::vector<Run> renamed = runs;
+  std::vector<unrig::Run> renamed = runs;
   for (std::size_t i = 0; i < runs.size(); ++i) renamed[i].file = std::to_string(runs.size() - i);
   EXPECT_EQ(order_of_search(renamed), order_of_search(runs)) << "not by the files' names";
-  for (Run& run : renamed) run.file = "";
+  for (unrig::Run& run : renamed) run.file = "";
   EXPECT_EQ(order_of_search(renamed), (std::vector<std::size_t>{0, 1, 2, 3, 4})) << "runs that cannot be told apart stay where they are";
 }
 
