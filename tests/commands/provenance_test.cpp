@@ -106,17 +106,25 @@ TEST_F(ProvenanceOf, AFitOfAnotherRigIsNotUsed) {
 }
 
 TEST_F(ProvenanceOf, AReportSaysThatTheRigIsAnother) {
-  const std::string rig = read_text(rig_), output = directory_.path("report.html");
-  const std::size_t at = rig.find("chord = \"") + 9;
-  std::filesystem::create_directory(directory_.path("data"));
-  for (const char* run : {"wet_pluck.csv", "step_a.csv"}) directory_.file(std::string("data/") + run, read_text(null_campaign(run)));
-  directory_.file("data/rig.toml", rig.substr(0, at) + "1" + rig.substr(at));
-  const Finished finished = run_unrig(directory_, {"report", fit_, "--data", directory_.path("data"), "-o", output});
-  EXPECT_EQ(finished.status, 0) << finished.err;
-  EXPECT_THAT(finished.err, HasSubstr("other numbers in [section]"));
-  EXPECT_THAT(read_text(output), AllOf(HasSubstr("other numbers in [section]"), HasSubstr("Made by unrig ")));
-  const Finished right = run_unrig(directory_, {"report", fit_, "-o", output});
-  EXPECT_THAT(right.err, Not(HasSubstr("other numbers")));
+  const std::string text = read_text(rig_), output = directory_.path("report.html"), rig = directory_.file("rig.toml", text), fit = directory_.path("own.json");
+  ASSERT_EQ(run_unrig(directory_, {"fit", "--rig", rig, wet_, step_, "-o", fit}).status, 0);
+  const Finished right = run_unrig(directory_, {"report", fit, "-o", output});
+  EXPECT_EQ(right.status, 0);
+  EXPECT_THAT(right.err, IsEmpty());
+  EXPECT_THAT(read_text(output), HasSubstr("Made by unrig "));
+
+  const std::size_t at = text.find("chord = \"") + 9;
+  directory_.file("rig.toml", text.substr(0, at) + "1" + text.substr(at));
+  const Finished changed = run_unrig(directory_, {"report", fit, "-o", output});
+  EXPECT_EQ(changed.status, 0) << changed.err;
+  EXPECT_THAT(changed.err, HasSubstr("other numbers in [section]"));
+  EXPECT_THAT(read_text(output), AllOf(HasSubstr("other numbers in [section]"), HasSubstr("gauge: residual")));
+
+  directory_.file("rig.toml", replaced(text, "calibration_element = ", "calibration_element = 15 # "));
+  const Finished other = run_unrig(directory_, {"report", fit, "-o", output});
+  EXPECT_EQ(other.status, 0) << other.err;
+  EXPECT_THAT(other.err, AllOf(HasSubstr("its structure"), HasSubstr("its plots are left out")));
+  EXPECT_THAT(read_text(output), Not(HasSubstr("gauge: residual")));
 }
 
 TEST_F(ProvenanceOf, AFitOfAnEarlierVersionStillWorks) {
