@@ -2,10 +2,13 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <filesystem>
+#include <map>
 #include <system_error>
 
 #include "core/error.h"
+#include "core/fingerprint.h"
 #include "core/text_file.h"
 
 namespace unrig {
@@ -52,6 +55,21 @@ void check_given_once(const std::vector<std::string>& recordings) {
     for (std::size_t j = 0; j < i; ++j)
       if (same_file(recordings[i], recordings[j]))
         throw InputError({recordings[i], 0}, "the recording is given twice" + (recordings[i] == recordings[j] ? "" : ", also as " + recordings[j]), "wanted each once: one recording counts once", "Leave one of them out.");
+}
+
+const Run* same_recording(const Run& run, const std::vector<Run>& runs, const Rig& rig) {
+  const std::string wanted = fingerprint(run, rig);
+  const auto found = std::find_if(runs.begin(), runs.end(), [&](const Run& other) { return fingerprint(other, rig) == wanted; });
+  return found == runs.end() ? nullptr : &*found;
+}
+
+void check_recorded_once(const std::vector<Run>& runs, const Rig& rig) {
+  std::map<std::string, const Run*> seen;
+  for (const Run& run : runs) {
+    const auto [same, is_new] = seen.emplace(fingerprint(run, rig), &run);
+    if (!is_new)
+      throw InputError({run.file, 0}, "it holds the same readings as " + same->second->file, "wanted each recording once: one that counts twice makes errors too small", "Leave one of them out.");
+  }
 }
 
 }  // namespace unrig

@@ -2,14 +2,18 @@
 
 #include <fcntl.h>
 #include <fmt/format.h>
+#include <signal.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <atomic>
 #include <cerrno>
 #include <cstring>
 #include <filesystem>
+#include <iterator>
 #include <limits>
+#include <memory>
 #include <new>
 #include <optional>
 #include <string_view>
@@ -17,6 +21,7 @@
 #include <utility>
 
 #include "core/error.h"
+#include "core/together.h"
 
 namespace unrig {
 namespace {
@@ -134,15 +139,19 @@ class TemporaryFile {
   TemporaryFile(const TemporaryFile&) = delete;
   TemporaryFile& operator=(const TemporaryFile&) = delete;
 
-  /// False with errno where a step fails. fsync comes before the name: a crash leaves the old file or the whole new one.
-  bool replace_target_with(const TextSource& text) {
-    if (!file_.is_open() || !write_pieces(file_.number(), text) || ::fsync(file_.number()) != 0) return false;
+  bool take_mode(mode_t mode) const { return file_.is_open() && ::fchmod(file_.number(), mode & 07777) == 0; }
+  /// These give false with errno where a step fails. fsync comes before the name: a crash leaves the old file or the whole new one.
+  bool write(const TextSource& text) const { return file_.is_open() && write_pieces(file_.number(), text) && ::fsync(file_.number()) == 0; }
+  bool take_name() {
     if (!named_) named_ = ::linkat(AT_FDCWD, link().c_str(), AT_FDCWD, path_.c_str(), AT_SYMLINK_FOLLOW) == 0;
-    if (!named_ || !file_.close() || ::rename(path_.c_str(), target_.c_str()) != 0) return false;
+    return named_ && file_.close();
+  }
+  bool replace_target() {
+    if (::rename(path_.c_str(), target_.c_str()) != 0) return false;
     named_ = false;
     return true;
   }
-  bool take_mode(mode_t mode) const { return file_.is_open() && ::fchmod(file_.number(), mode & 07777) == 0; }
+  fs::path folder() const { return target_.parent_path(); }
 
  private:
   /// Short, so that a target whose name is as long as the system allows can still be written.
@@ -168,6 +177,49 @@ class TemporaryFile {
 void flush_directory(const fs::path& directory) {
   const OpenFile opened(directory.empty() ? "." : directory.string(), O_RDONLY | O_DIRECTORY);
   if (opened.is_open()) ::fsync(opened.number());
+}
+
+/// Holds up what would end the process, as long as it lives.
+class NoSignals {
+ public:
+  NoSignals() {
+    sigset_t all;
+    ::sigfillset(&all);
+    ::pthread_sigmask(SIG_BLOCK, &all, &before_);
+  }
+  ~NoSignals() { ::pthread_sigmask(SIG_SETMASK, &before_, nullptr); }
+  NoSignals(const NoSignals&) = delete;
+  NoSignals& operator=(const NoSignals&) = delete;
+
+ private:
+  sigset_t before_{};
+};
+
+/// All of `file` on disk, without its name yet; nothing where it was written directly.
+std::unique_ptr<TemporaryFile> prepared(const TextFile& file) {
+  const auto old = status(file.path);
+  if (old && is_written_directly(file.path, *old)) {
+    write_directly(file.path, file.text);
+    return nullptr;
+  }
+  auto temporary = std::make_unique<TemporaryFile>(followed(file.path), 0666);
+  if (old && !temporary->take_mode(old->st_mode)) refuse_write(file.path, reason());
+  if (!temporary->write(file.text)) refuse_write(file.path, reason());
+  return temporary;
+}
+
+void replace_all(const std::vector<TextFile>& files) {
+  for (const TextFile& file : files) check_writable(file.path);
+  std::vector<std::unique_ptr<TemporaryFile>> whole;
+  for (const TextFile& file : files) whole.push_back(prepared(file));
+  {
+    const NoSignals while_files_change_places;
+    for (const bool in_place : {false, true})
+      for (std::size_t i = 0; i < whole.size(); ++i)
+        if (whole[i] && !(in_place ? whole[i]->replace_target() : whole[i]->take_name())) refuse_write(files[i].path, reason());
+  }
+  for (const auto& file : whole)
+    if (file) flush_directory(file->folder());
 }
 
 }  // namespace
@@ -234,16 +286,12 @@ void check_writable(const std::string& path) {
   refuse_write(path, reason(), absent ? "The folder " + folder + " is not there; make it first." : "");
 }
 
-void write_text(const std::string& path, const TextSource& text) {
-  check_writable(path);
-  const auto old = status(path);
-  if (old && is_written_directly(path, *old)) return write_directly(path, text);
+void write_text(const std::string& path, const TextSource& text) { replace_all({{path, text}}); }
 
-  const fs::path target = followed(path);
-  TemporaryFile temporary(target, 0666);
-  if (old && !temporary.take_mode(old->st_mode)) refuse_write(path, reason());
-  if (!temporary.replace_target_with(text)) refuse_write(path, reason());
-  flush_directory(target.parent_path());
+void write_together(const std::vector<TextFile>& files) {
+  std::vector<TextFile> wanted;
+  std::copy_if(files.begin(), files.end(), std::back_inserter(wanted), [](const TextFile& file) { return !file.path.empty(); });
+  replace_all(wanted);
 }
 
 }  // namespace unrig

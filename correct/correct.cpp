@@ -262,7 +262,7 @@ void describe_run(const CorrectProblem& problem, CorrectResult& result) {
   result.calibration_uncertainty = problem.calibration_uncertainty > 0 ? problem.calibration_uncertainty : rig.calibration_uncertainty;
   result.imposed = problem.imposed;
   result.warnings = run.warnings;
-  if (problem.fit.had_other_readings(run))
+  if (problem.fit.had_other_readings(run, problem.rig))
     result.warnings.push_back(fmt::format("{}: other readings or conditions than those that {} was fitted to; the band takes them for the fitted ones. Fit again, or give the new recording another name.", run.file, problem.fit.file));
 }
 

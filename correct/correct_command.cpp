@@ -5,8 +5,10 @@
 
 #include "core/command.h"
 #include "core/command_line.h"
+#include "core/fingerprint.h"
 #include "core/given_files.h"
-#include "core/text_file.h"
+#include "core/provenance.h"
+#include "core/together.h"
 #include "correct/correct.h"
 #include "correct/corrected_files.h"
 #include "correct/modal_load.h"
@@ -15,11 +17,12 @@ namespace unrig {
 
 namespace {
 
+/// Both files in one, or none.
 template <class Result>
-void finish(const Result& result, const std::string& output, Progress& progress) {
+void finish(const Result& result, const std::string& output, const TextFile& further, const MadeBy& made_by, Progress& progress) {
   for (const std::string& warning : result.warnings) warn(warning);
   progress("writing " + output);
-  write_text(output, [&](const TextSink& sink) { to_csv(sink, result); });
+  write_together({further, {output, [&](const TextSink& sink) { to_csv(sink, result, made_by); }}});
   progress.clear();
   fmt::print("{}", report(result));
 }
@@ -51,15 +54,16 @@ int correct_command(int argc, char** argv) {
   progress("reading " + run_path);
   const CorrectProblem problem{read_rig(rig_path), read_fit(fit_path), read_run(run_path), calibration, imposed};
   progress("taking the rig out of " + run_path);
+  if (problem.fit.rig_fingerprint.empty()) warn(fit_path + ": it does not say what the rig was: an earlier version wrote it. Whether it belongs to " + rig_path + " was not compared.");
+  const MadeBy made_by{provenance_of(argc, argv, {"--indicial"}), fingerprint(problem.rig), fingerprint(problem.run, problem.rig), fingerprint(problem.fit)};
   if (problem.rig.is_modal()) {
     if (imposed.any() || !indicial.empty())
       throw InputError({rig_path, 0}, "a rig known only as modes", "wanted a rig with a section for an indicial response", "Leave out --indicial, --monotone and --at-step.");
-    finish(modal_load(problem), output, progress);
+    finish(modal_load(problem), output, {}, made_by, progress);
     return exit_done;
   }
   const CorrectResult result = correct(problem);
-  if (!indicial.empty()) write_text(indicial, to_indicial_csv(result));
-  finish(result, output, progress);
+  finish(result, output, {indicial, [&](const TextSink& sink) { sink(to_indicial_csv(result, made_by)); }}, made_by, progress);
   if (result.no_answer.empty()) return exit_done;
   warn("no trustworthy answer: " + result.no_answer);
   return exit_no_answer;

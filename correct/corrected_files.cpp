@@ -31,14 +31,14 @@ void further_cells(Out out, const Row& by_source, double band, double half, doub
 
 }  // namespace
 
-std::string to_csv(const CorrectResult& r) {
-  return whole_text([&](const TextSink& sink) { to_csv(sink, r); });
+std::string to_csv(const CorrectResult& r, const MadeBy& made_by) {
+  return whole_text([&](const TextSink& sink) { to_csv(sink, r, made_by); });
 }
 
-void to_csv(const TextSink& sink, const CorrectResult& r) {
+void to_csv(const TextSink& sink, const CorrectResult& r, const MadeBy& made_by) {
   std::string text = "time [s],semichords,gauge [N],normal_force [N],normal_force_std [N],circulatory [N],circulatory_std [N],cn,cn_std";
   text += further_columns("circulatory", " [N]") + further_columns("normal_force", " [N]") + ",unexplained [N]";
-  const HowFarToTrust trust{r.reduced_chi2, r.warnings, r.no_answer};
+  const HowFarToTrust trust{r.reduced_chi2, r.warnings, r.no_answer, made_by};
   sink(text + trust.header() + "\n");
   const std::string last_cells = trust.cells();
   const CorrectedLoad &normal = r.normal_force, &circulatory = r.circulatory;
@@ -60,10 +60,10 @@ void to_csv(const TextSink& sink, const CorrectResult& r) {
   }
 }
 
-std::string to_indicial_csv(const CorrectResult& r) {
+std::string to_indicial_csv(const CorrectResult& r, const MadeBy& made_by) {
   const IndicialResponse& response = r.indicial;
   std::string text = "semichords,indicial,indicial_std" + further_columns("indicial", "") + ",cn_per_radian [1/rad],cn_per_radian_std [1/rad]";
-  const HowFarToTrust trust{r.reduced_chi2, r.warnings, r.no_answer};
+  const HowFarToTrust trust{r.reduced_chi2, r.warnings, r.no_answer, made_by};
   text += trust.header() + "\n";
   const std::string last_cells = trust.cells();
   auto out = std::back_inserter(text);

@@ -4,15 +4,17 @@
 #include <vector>
 
 #include "core/csv_table.h"
+#include "core/provenance.h"
 
 namespace unrig {
 
-/// What a reader of the results must know, in the last columns of their tables: the reduced chi-square in every row, and a column of ones for each warning, which is its name, and for what makes the
-/// numbers no answer. Every cell stays a number, and the header the first line, as correct/manual/results.md shows it: lines of comment or columns of text would stop the programs that read these tables.
+/// What a reader of the results must know, in the last columns of their tables: the reduced chi-square in every row, and a column of ones for each warning, which is its name, for what makes the
+/// numbers no answer, and for what made them. Every cell stays a number, and the header the first line, as correct/manual/results.md shows it: lines of comment or columns of text would stop the programs that read these tables.
 struct HowFarToTrust {
   double reduced_chi2 = 0;  ///< NaN where the result has none
   std::vector<std::string> warnings;
   std::string no_answer;
+  MadeBy made_by = {};
 
   std::string header() const;
   /// The cells of any row.

@@ -188,16 +188,16 @@ ModalLoad modal_load(const CorrectProblem& problem) {
   return result;
 }
 
-std::string to_csv(const ModalLoad& r) {
-  return whole_text([&](const TextSink& sink) { to_csv(sink, r); });
+std::string to_csv(const ModalLoad& r, const MadeBy& made_by) {
+  return whole_text([&](const TextSink& sink) { to_csv(sink, r, made_by); });
 }
 
-void to_csv(const TextSink& sink, const ModalLoad& r) {
+void to_csv(const TextSink& sink, const ModalLoad& r, const MadeBy& made_by) {
   std::string text = fmt::format("time [s],gauge [{0}],normal_force [{0}],normal_force_std [{0}]", r.unit);
   for (Index s = 0; s < sources; ++s)
     if (s != static_cast<Index>(Source::angle)) text += fmt::format(",normal_force_std_{} [{}]", source_names[static_cast<std::size_t>(s)], r.unit);
   text += fmt::format(",normal_force_band95 [{0}],normal_force_half_weight [{0}],normal_force_twice_weight [{0}],from_inputs [{0}]", r.unit);
-  const HowFarToTrust trust{std::nan(""), r.warnings, {}};
+  const HowFarToTrust trust{std::nan(""), r.warnings, {}, made_by};
   sink(text + trust.header() + "\n");
   const std::string last_cells = trust.cells();
   for (Index k = 0; k < r.load.size(); ++k) {

@@ -3,6 +3,7 @@
 #include <string>
 #include <vector>
 
+#include "core/provenance.h"
 #include "core/text_file.h"
 #include "correct/correct.h"
 
@@ -39,9 +40,9 @@ struct ModalLoad {
 ModalLoad modal_load(const CorrectProblem& problem);
 
 /// time, gauge, normal_force and its standard deviation, then as in corrected.csv, each in the unit of the reading.
-std::string to_csv(const ModalLoad& result);
+std::string to_csv(const ModalLoad& result, const MadeBy& made_by = {});
 /// The same row by row, for files that are long.
-void to_csv(const TextSink& sink, const ModalLoad& result);
+void to_csv(const TextSink& sink, const ModalLoad& result, const MadeBy& made_by = {});
 std::string report(const ModalLoad& result);
 
 }  // namespace unrig

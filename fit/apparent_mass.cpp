@@ -6,6 +6,7 @@
 
 #include <fmt/format.h>
 
+#include "core/fingerprint.h"
 #include "core/text_file.h"
 #include "fit/rig_frequencies.h"
 
@@ -40,10 +41,11 @@ void check(const ApparentMassProblem& problem) {
 /// Of several poles the mean decay wanders, and its error says by how much, not that there might be none.
 bool dies_away(const DampedMode& m) { return m.decay > (m.poles == 1 ? 2 * m.decay_error : 0); }
 
-RunModes measure(const Run& run, const std::vector<std::string>& channels) {
+RunModes measure(const Run& run, const Rig& rig, const std::vector<std::string>& channels) {
   const DampedFrequencies found = damped_frequencies(run, channels);
   RunModes modes;
   modes.file = run.file;
+  modes.fingerprint = fingerprint(run, rig);
   modes.medium = run.medium;
   modes.density = run.density;
   modes.channels = channels;
@@ -309,13 +311,14 @@ ApparentMassResult apparent_mass(const ApparentMassProblem& problem) {
   check(problem);
   ApparentMassResult result;
   result.rig_file = problem.rig.file;
+  result.rig_fingerprint = fingerprint(problem.rig);
   for (const auto* warnings : {&problem.rig.warnings, &problem.dry.warnings, &problem.wet.warnings})
     result.warnings.insert(result.warnings.end(), warnings->begin(), warnings->end());
   const AeroelasticModel model = model_of(problem.rig, {problem.dry, problem.wet}, Wagner::within_1e4);
   tell(problem, "measuring the dry frequencies");
-  result.dry = measure(problem.dry, model.output_channels(problem.dry));
+  result.dry = measure(problem.dry, problem.rig, model.output_channels(problem.dry));
   tell(problem, "measuring the wet frequencies");
-  result.wet = measure(problem.wet, model.output_channels(problem.wet));
+  result.wet = measure(problem.wet, problem.rig, model.output_channels(problem.wet));
   note_strangers(result.dry);
   note_strangers(result.wet);
 

@@ -36,7 +36,7 @@ struct ModeLine {
 
 /// The frequencies of one run.
 struct RunModes {
-  std::string file;
+  std::string file, fingerprint;  ///< of its readings (core/fingerprint.h)
   std::string medium;
   double density = 0;  ///< kg/m^3
   std::vector<ModeLine> modes;  ///< ascending in frequency
@@ -51,7 +51,7 @@ enum class ApparentMassMethod { mode_shapes, frequency_ratio };
 
 struct ApparentMassResult {
   ApparentMassMethod method = ApparentMassMethod::mode_shapes;
-  std::string rig_file;
+  std::string rig_file, rig_fingerprint;
   std::optional<Estimate> coefficient;  ///< C_a: apparent mass over pi rho b^2; where the rig file gives a chord
   Estimate mass;                        ///< kg/m along the span (mode shapes) or kg (frequency ratio)
   std::string mass_unit;

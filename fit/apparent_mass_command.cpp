@@ -6,6 +6,7 @@
 #include "core/command.h"
 #include "core/command_line.h"
 #include "core/given_files.h"
+#include "core/provenance.h"
 #include "core/text_file.h"
 #include "fit/apparent_mass.h"
 #include "fit/apparent_mass_files.h"
@@ -39,7 +40,7 @@ int apparent_mass_command(int argc, char** argv) {
   const ApparentMassResult result = apparent_mass(problem);
   progress.clear();
   for (const std::string& warning : result.warnings) warn(warning);
-  write_text(output, to_json(result));
+  write_text(output, to_json(result, provenance_of(argc, argv)));
   fmt::print("{}", report(result));
   return exit_done;
 }

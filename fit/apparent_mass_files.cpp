@@ -45,6 +45,7 @@ json mode_json(const ModeLine& line) {
 json run_json(const RunModes& run) {
   const DampedMode& m = run.lowest();
   json out = {{"file", run.file},
+              {"fingerprint", run.fingerprint},
               {"medium", run.medium},
               {"density", {{"value", run.density}, {"unit", "kg/m^3"}}},
               {"frequency", number(m.frequency)},
@@ -100,10 +101,13 @@ std::string shape_remark(const ApparentMassResult& r) {
 
 }  // namespace
 
-std::string to_json(const ApparentMassResult& r) {
+std::string to_json(const ApparentMassResult& r, const Provenance& made) {
   json out;
   out["unrig"] = "apparent-mass";
   out["rig"] = r.rig_file;
+  out["rig_fingerprint"] = r.rig_fingerprint;
+  if (!made.program.empty()) out["program"] = made.program;
+  if (!made.command.empty()) out["command"] = made.command;
   out["method"] = name_of(r.method);
   out["apparent_mass_coefficient"] = estimate(r.coefficient);
   out["apparent_mass"] = estimate(r.mass);

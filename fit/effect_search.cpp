@@ -206,16 +206,27 @@ double Trial::excess() const {
   return power / count;
 }
 
-double bic_difference(const Trial& a, const Trial& b) {
-  const Trial& better = a.reduced_chi2() < b.reduced_chi2() ? a : b;
-  double difference = 0, total = 0;
+namespace {
+
+const Trial& better_of(const Trial& a, const Trial& b) { return a.reduced_chi2() < b.reduced_chi2() ? a : b; }
+
+}  // namespace
+
+double deviance_difference(const Trial& a, const Trial& b) {
+  const Trial& better = better_of(a, b);
+  double difference = 0;
   for (std::size_t r = 0; r < a.variance.size(); ++r) {
     difference += better.samples[r] * std::log(a.variance[r] / b.variance[r]);
     // Of a run that is not explained the gauge is weighted down, and does not bend the motion.
     if (a.angle_samples[r] > 0 && std::max(a.variance[r], b.variance[r]) < explained) difference += b.angle_samples[r] * std::log(a.angle_variance[r] / b.angle_variance[r]);
-    total += better.samples[r];
   }
-  return difference + (a.variables - b.variables) * std::log(total);
+  return difference;
+}
+
+double bic_difference(const Trial& a, const Trial& b) {
+  double total = 0;
+  for (const double samples : better_of(a, b).samples) total += samples;
+  return deviance_difference(a, b) + (a.variables - b.variables) * std::log(total);
 }
 
 Trial fit_baseline(const FitProblem& problem) {
@@ -311,7 +322,8 @@ void judge_decays(Trial& trial) {
 }
 
 bool follow_nonlinear(Trial& trial, const Trial& base, double least) {
-  if (!fit_decays_first(trial, base)) return false;
+  trial.ruled_out = !fit_decays_first(trial, base);
+  if (trial.ruled_out) return false;
   if (decays_decide(trial)) {
     follow_motions(trial);
     return true;

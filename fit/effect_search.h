@@ -19,6 +19,7 @@ struct Trial {
   std::vector<double> angle_variance = {}, angle_samples = {};  ///< the same of the angle, where the motion is estimated; no samples elsewhere
   int variables = 0;
   DecaysLeft decays = {INFINITY, true};  ///< what fit_decays left of them; infinite: not asked
+  bool ruled_out = false;         ///< by the free decays: the other runs were not searched
 
   double reduced_chi2() const;    ///< over all runs, in units of the noise
   /// Residual power above the noise, over the noise; a run that is left with less than its noise makes up for no other.
@@ -42,6 +43,8 @@ bool is_a_signal(const std::string& id, const JointProblem& joint);
 /// -2 ln likelihood of the gauge with each run's own variance, and of the angle where both explain the run, plus ln(samples) per variable, of `a` less that of `b`
 /// (G. Schwarz, Annals of Statistics 6 (1978) 461). Samples of the gauge count by the colour of the better of the two.
 double bic_difference(const Trial& a, const Trial& b);
+/// The same without what variables cost: -2 ln likelihood.
+double deviance_difference(const Trial& a, const Trial& b);
 
 /// The best fit with nothing missing.
 Trial fit_baseline(const FitProblem& problem);

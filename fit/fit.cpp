@@ -7,12 +7,15 @@
 #include <fmt/format.h>
 
 #include "core/effects/effect.h"
+#include "core/fingerprint.h"
 #include "fit/arrival.h"
 #include "fit/decays_first.h"
 #include "fit/effect_option.h"
 #include "fit/effect_search.h"
 #include "fit/fit_description.h"
 #include "fit/gauss_newton.h"
+#include "fit/out_of_proportion.h"
+#include "fit/run_order.h"
 #include "fit/uncertainty.h"
 #include "fit/undetermined.h"
 #include "fit/unheard.h"
@@ -97,6 +100,7 @@ AeroelasticModel model_of(const Rig& rig, const std::vector<Run>& runs, Wagner c
 FitResult describe_fit(Arrival& arrival, const FitProblem& problem, Settle first) {
   FitResult result;
   result.rig_file = problem.rig.file;
+  result.rig_fingerprint = fingerprint(problem.rig);
   result.circulation = problem.circulation;
   result.effects = problem.effects;
   result.warnings = problem.rig.warnings;
@@ -125,10 +129,13 @@ FitResult describe_fit(Arrival& arrival, const FitProblem& problem, Settle first
   judge_answer(result);
   warn_of_silent_runs(joint, result);
   warn_of_mismatch(result);
+  for (const std::string& warning : out_of_proportion(result.parameters)) result.warnings.push_back(warning);
   return result;
 }
 
-FitResult fit(const FitProblem& problem) {
+namespace {
+
+FitResult fit_in_order(const FitProblem& problem) {
   const auto begin = std::chrono::steady_clock::now();
   refuse_idle("--effect", problem.effects, problem.rig, problem.runs);
   const auto model = std::make_shared<const AeroelasticModel>(model_of(problem.rig, problem.runs, problem.circulation, problem.effects));
@@ -137,6 +144,18 @@ FitResult fit(const FitProblem& problem) {
   check_lengths(arrival.joint);
   FitResult result = describe_fit(arrival, problem, Settle::steps);
   result.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+  return result;
+}
+
+}  // namespace
+
+FitResult fit(const FitProblem& problem) {
+  const std::vector<std::size_t> order = order_of_search(problem.runs);
+  if (is_as_given(order)) return fit_in_order(problem);
+  FitProblem ordered = problem;
+  ordered.runs = in_order(problem.runs, order);
+  FitResult result = fit_in_order(ordered);
+  tell_as_given(GivenOrder(problem.runs), result);
   return result;
 }
 

@@ -10,6 +10,7 @@
 #include "core/command_line.h"
 #include "core/given_files.h"
 #include "core/in_parallel.h"
+#include "core/provenance.h"
 #include "core/text_file.h"
 #include "fit/effect_option.h"
 #include "fit/fit.h"
@@ -60,6 +61,7 @@ int fit_command(int argc, char** argv) {
     throw InputError({"--wagner", 0}, e.what(), "wanted one of the names above", "");
   }
   for (const std::string& path : run_paths) problem.runs.push_back(read_run(path));
+  check_recorded_once(problem.runs, problem.rig);
   problem.effects = effects_of_option("--effect", effect_ids);
   for (const std::string& start : starts) {
     const std::size_t equals = start.find('=');
@@ -72,7 +74,10 @@ int fit_command(int argc, char** argv) {
   }
   Progress progress;
   problem.progress = [&](const std::string& what) { progress(what); };
-  const FitResult result = fit(problem);
+  FitResult result = fit(problem);
+  const Provenance made = provenance_of(argc, argv);
+  result.program = made.program;
+  result.command = made.command;
   progress.clear();
   for (const std::string& warning : result.warnings) warn(warning);
   write_text(output, to_json(result));

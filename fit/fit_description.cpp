@@ -104,7 +104,7 @@ FittedRun describe_run(const RunResidual& residual, const VectorXd& theta, doubl
   const RunResidual::Prediction p = residual.predict(theta);
   FittedRun fitted;
   fitted.file = run.file;
-  fitted.fingerprint = fingerprint(run);
+  fitted.fingerprint = fingerprint(run, residual.model().rig());
   fitted.onset_angle = residual.conditions().onset_angle;
   fitted.samples = run.samples();
   fitted.chi2 = chi2;

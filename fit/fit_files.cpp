@@ -6,6 +6,7 @@
 #include <vector>
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 #include <nlohmann/json.hpp>
 
 #include "core/effects/effect.h"
@@ -68,6 +69,9 @@ std::string to_json(const FitResult& r) {
   json out;
   out["unrig"] = "fit";
   out["rig"] = r.rig_file;
+  if (!r.rig_fingerprint.empty()) out["rig_fingerprint"] = r.rig_fingerprint;
+  if (!r.program.empty()) out["program"] = r.program;
+  if (!r.command.empty()) out["command"] = r.command;
   out["converged"] = r.converged;
   out["message"] = r.message;
   if (!r.no_answer.empty()) out["no_answer"] = r.no_answer;
@@ -146,6 +150,8 @@ FittedRig read_fit(const json& in, const std::string& path) {
   try {
     FittedRig fit;
     fit.file = path;
+    fit.rig_file = in.value("rig", "");
+    fit.rig_fingerprint = in.value("rig_fingerprint", "");
     const std::string circulation = in.value("circulation", "1e-4");
     fit.circulation = wagner_from_name(circulation);
     if (in.contains("modes")) {
@@ -187,9 +193,45 @@ FittedRig read_fit(const json& in, const std::string& path) {
   }
 }
 
-bool FittedRig::had_other_readings(const Run& run) const {
+bool FittedRig::had_other_readings(const Run& run, const Rig& rig) const {
   const auto place = static_cast<std::size_t>(std::find(runs.begin(), runs.end(), recorded_as(run.file)) - runs.begin());
-  return place < fingerprints.size() && !fingerprints[place].empty() && fingerprints[place] != fingerprint(run);
+  if (place >= fingerprints.size() || fingerprints[place].empty()) return false;
+  return fingerprints[place] != unrig::fingerprint(run, rig) && fingerprints[place] != unrig::fingerprint(run);  // an earlier version counted every column
+}
+
+std::vector<std::string> FittedRig::rig_differs_in(const Rig& rig) const {
+  if (rig_fingerprint.empty()) return {};
+  std::vector<std::string> parts = parts_that_differ(rig_fingerprint, unrig::fingerprint(rig));
+  std::erase_if(parts, [](const std::string& part) { return part == "sensors" || part == "modes"; });
+  return parts;
+}
+
+std::string fingerprint(const FittedRig& fit) {
+  const auto run_of = [&](const FittedParameter& p) {
+    const auto place = static_cast<std::size_t>(std::find(fit.runs.begin(), fit.runs.end(), p.run) - fit.runs.begin());
+    return place < fit.fingerprints.size() ? fit.fingerprints[place] : p.run;
+  };
+  std::vector<std::string> items{fmt::format("circulation {} modes {} {} steps {} rig {}", name_of(fit.circulation), fit.normal_modes, fit.torsion_modes, fit.law_steps, fit.rig_fingerprint)};
+  for (const std::string& id : fit.effects) items.push_back("effect " + id);
+  std::vector<std::string> names;
+  for (const FittedParameter& p : fit.parameters) {
+    names.push_back(p.name + " " + run_of(p));
+    items.push_back(fmt::format("{} = {} +/- {} {}", names.back(), p.value, p.std_error, p.identified));
+  }
+  for (std::size_t i = 0; i < names.size(); ++i)
+    for (std::size_t j = 0; j < i; ++j)
+      items.push_back(fmt::format("{} with {}: {}", std::min(names[i], names[j]), std::max(names[i], names[j]), fit.correlation(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(j))));
+  std::sort(items.begin(), items.end());
+  std::string text;
+  for (const std::string& item : items) text += item + "\n";
+  return fingerprint(std::string_view(text));
+}
+
+std::string other_rig(const Rig& rig, const FittedRig& fit) {
+  std::vector<std::string> parts = fit.rig_differs_in(rig);
+  if (parts.empty()) return "";
+  for (std::string& part : parts) part = part == "structure" ? "its structure (elements, modes, where gauge and strips sit)" : "[" + part + "]";
+  return fmt::format("other numbers in {} than the rig{} that {} was fitted to", fmt::join(parts, ", "), fit.rig_file.empty() ? "" : " " + fit.rig_file, fit.file);
 }
 
 std::string FittedRig::recorded_as(const std::string& run_file) const { return same_recording(runs, file, run_file); }
@@ -204,6 +246,8 @@ const FittedParameter* FittedRig::find(const std::string& name, const std::strin
 }
 
 void check_is_fit_of(const AeroelasticModel& model, const FittedRig& fit, const std::string& run_file) {
+  if (const std::string found = other_rig(model.rig(), fit); !found.empty())
+    throw InputError({model.rig().file, 0}, found, "wanted the rig of the fit: its parameters multiply the numbers of its rig file", "Fit this rig, or give the rig file as it was.");
   for (const Parameter& p : model.parameters())
     if (!p.per_run && !fit.find(p.name, run_file))
       throw InputError({fit.file, 0}, "no parameter \"" + p.name + "\"", "wanted a fit of the rig " + model.rig().file, "Fit this rig to its free decays and steps first.");

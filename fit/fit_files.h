@@ -12,6 +12,7 @@ std::string to_json(const FitResult& result);
 /// Parameters of a `fit.json`, as far as `simulate` and `correct` need them.
 struct FittedRig {
   std::string file;
+  std::string rig_file, rig_fingerprint;  ///< of the rig that was fitted (core/fingerprint.h); empty in a fit.json of an earlier version
   Wagner circulation = Wagner::within_1e4;
   Eigen::Index normal_modes = 0, torsion_modes = 0;
   std::vector<std::string> effects;  ///< at work in the fitted model
@@ -25,7 +26,10 @@ struct FittedRig {
   /// The recording that the fit knows this file as, empty if it took no part: the same path or file; by its name, and the folders that agree, only where the fit's own file is no longer there.
   std::string recorded_as(const std::string& run_file) const;
   /// Whether the fit knows this recording's file with other readings or conditions. False for a file that took no part, and where the fit does not say.
-  bool had_other_readings(const Run& run) const;
+  bool had_other_readings(const Run& run, const Rig& rig) const;
+  /// In which parts the fitted rig had other numbers than this one, as the rig file calls them; none where the fit does not say. Sensors and the number of modes kept are not asked for: its parameters mean the
+  /// same without them.
+  std::vector<std::string> rig_differs_in(const Rig& rig) const;
   /// The value of a parameter, of this run (known likewise) where it has its own; `missing` where there is none.
   double value(const std::string& name, const std::string& run_file, double missing) const;
   const FittedParameter* find(const std::string& name, const std::string& run_file) const;
@@ -34,7 +38,14 @@ struct FittedRig {
 /// Throws InputError where the file is not a fit.
 FittedRig read_fit(const std::string& path);
 
-/// Throws InputError where a parameter of the rig is none of the fit: it is a fit of another rig.
+/// Sixteen digits that tell one fit from another: of its parameters and what they were fitted with, in whatever order its runs were given.
+std::string fingerprint(const FittedRig& fit);
+
+/// "other numbers in [section] than the rig rig.toml that fit.json was fitted to"; empty where they are the same, or the fit does not say.
+std::string other_rig(const Rig& rig, const FittedRig& fit);
+
+/// Throws InputError where the fit says that its rig had other numbers: its parameters are multiples of them, and an answer would be wrong by as much as nobody knows. And where a parameter of the rig is none
+/// of the fit.
 void check_is_fit_of(const AeroelasticModel& model, const FittedRig& fit, const std::string& run_file);
 
 /// theta of `model` for a run: the fit's values, and the model's start values for what the fit does not name. For a run that was not fitted the slope of the normal force is that of the

@@ -10,8 +10,10 @@
 
 #include "core/command.h"
 #include "core/command_line.h"
+#include "core/fingerprint.h"
 #include "core/given_files.h"
 #include "core/indicial_table.h"
+#include "core/provenance.h"
 #include "core/run_text.h"
 #include "core/scan.h"
 #include "core/simulate.h"
@@ -99,17 +101,26 @@ void take_out_noise_of_the_angle(const Rig& rig, Run& run) {
   warn(fmt::format("{}: the angle is a measurement, with a noise of {:.2g} deg; simulated is the smooth motion that it says (--as-recorded: every reading as it is)", run.file, motion->noise / degree));
 }
 
-SimulateProblem problem_of(const Options& options) {
+struct ToSimulate {
+  SimulateProblem problem;
+  MadeBy made_by;
+};
+
+ToSimulate problem_of(const Options& options, const Provenance& made) {
   const Rig rig = read_rig(options.rig);
   for (const std::string& warning : rig.warnings) warn(warning);
   Run run = read_run(options.run);
   for (const std::string& warning : run.warnings) warn(warning);
   std::optional<FittedRig> fit;
   if (!options.fit.empty()) fit = read_fit(options.fit);
-  if (fit && fit->had_other_readings(run))
+  if (fit)
+    if (const std::string found = other_rig(rig, *fit); !found.empty())
+      warn(rig.file + ": " + found + "; simulated is this rig with the fit's parameters, which multiply its numbers.");
+  if (fit && fit->had_other_readings(run, rig))
     warn(fmt::format("{}: other readings or conditions than those that {} was fitted to; it is simulated with the slope and the steady load of the fitted ones all the same. Fit again, or give the new recording "
                      "another name.",
                      run.file, fit->file));
+  const MadeBy made_by{made, fingerprint(rig), fingerprint(run, rig), fit ? fingerprint(*fit) : ""};
   if (!options.as_recorded && !options.jumps) take_out_noise_of_the_angle(rig, run);
 
   std::optional<TabulatedIndicial> table;
@@ -127,7 +138,7 @@ SimulateProblem problem_of(const Options& options) {
   for (const std::string& setting : options.settings) set(setting, problem);
   if (options.jumps) problem.pitch = PitchBetweenSamples::jumps;
   if (!options.release_load.empty()) problem.release_load = quantity(options.release_load, "N", {"--release-load", 0}, "the release load");
-  return problem;
+  return {std::move(problem), made_by};
 }
 
 /// A recording beside its prediction, but for the zero of the channel: how far the two are apart.
@@ -201,13 +212,14 @@ int simulate_command(int argc, char** argv) {
   }
 
   check_outputs({{"-o", options.output}}, {options.rig, options.run, options.fit, options.indicial});
-  const SimulateProblem problem = problem_of(options);
+  const ToSimulate given = problem_of(options, provenance_of(argc, argv));
+  const SimulateProblem& problem = given.problem;
   Progress progress;
   progress("simulating " + options.run);
   const SimulateResult result = simulate(problem);
   for (const std::string& warning : result.warnings) warn(warning);
   progress("writing " + options.output);
-  write_text(options.output, [&](const TextSink& sink) { run_text(sink, result.run, SimulatedRun{problem.run.file, recipe(problem)}.remarks()); });
+  write_text(options.output, [&](const TextSink& sink) { run_text(sink, result.run, SimulatedRun{problem.run.file, recipe(problem), given.made_by}.remarks()); });
   progress.clear();
   print_summary(problem, result, options.output);
   print_comparison(problem.run, result);

@@ -12,6 +12,7 @@ constexpr std::string_view remark = "# # ", simulated = "simulated with the rig 
 std::vector<std::string> SimulatedRun::remarks() const {
   std::vector<std::string> lines = recipe;
   lines.insert(lines.begin() + 1, std::string(of) + of_run);
+  if (const std::string made = made_by.column(); !made.empty()) lines.insert(lines.begin() + 2, made);
   return lines;
 }
 
@@ -25,6 +26,8 @@ std::optional<SimulatedRun> simulated_run(std::string_view text) {
     line.remove_prefix(remark.size());
     if (line.starts_with(of))
       run.of_run = line.substr(of.size());
+    else if (line.starts_with(MadeBy::prefix))
+      run.made_by = MadeBy::of_column(line.substr(MadeBy::prefix.size()));
     else
       run.recipe.emplace_back(line);
   }

@@ -93,6 +93,7 @@ void add_apparent_mass(ReportPage& page, const json& result, const std::string& 
   if (result.contains("joint_fit")) rows.push_back({"the same from a joint fit of both decays", estimate(result, "joint_fit"), text_of(result["joint_fit"], "unit") == "1" ? "" : text_of(result["joint_fit"], "unit")});
   page.add_table("", {"quantity", "value ± one standard error", "unit"}, rows, "Method: " + text_of(result, "method") + ". " + text_of(result, "agreement"));
   add_modes(page, result);
+  add_provenance(page, result);
 
   const auto dry = found_file(text_of(result.at("dry"), "file"), path, options), wet = found_file(text_of(result.at("wet"), "file"), path, options);
   if (!dry || !wet) {

@@ -67,6 +67,7 @@ void add_verdict(ReportPage& page, const HowFarToTrust& trust, Tone tone, const 
 void add_warnings(ReportPage& page, const HowFarToTrust& trust) {
   if (!trust.no_answer.empty()) page.add_text("No trustworthy answer: " + trust.no_answer);
   for (const std::string& warning : trust.warnings) page.add_text("Warning: " + warning);
+  add_provenance(page, trust.made_by.provenance);
 }
 
 }  // namespace

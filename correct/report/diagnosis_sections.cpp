@@ -86,10 +86,11 @@ void add_places(ReportPage& page, const json& mismatch) {
 void add_ranking(ReportPage& page, const json& ranking) {
   std::vector<std::vector<std::string>> rows;
   for (const json& r : ranking)
-    rows.push_back({text_of(r, "effect"), plain(number_of(r, "score"), 4), plain(number_of(r, "reduced_chi2"), 4), plain(number_of(r, "delta_bic"), 5), plain(number_of(r, "probability"), 3)});
-  if (!rows.empty()) page.add_table("Ranking of the effects", {"effect", "score", "reduced chi-square", "change of BIC", "probability"}, rows,
+    rows.push_back({text_of(r, "effect"), plain(number_of(r, "score"), 4), plain(number_of(r, "reduced_chi2"), 4), plain(number_of(r, "delta_bic"), 5), plain(number_of(r, "probability"), 3), text_of(r, "search")});
+  if (!rows.empty()) page.add_table("Ranking of the effects", {"effect", "score", "reduced chi-square", "change of BIC", "probability", "search"}, rows,
                    "Score: the share of the excess of chi-square that one linear step in the effect's parameters promised to remove, which decided what was fitted in full; 0 for what joined the search later. "
-                   "The more negative the change of BIC, the more the effect explains for its parameters.");
+                   "The more negative the change of BIC, the more the effect explains for its parameters. Search: failed where it left more than without the effect, which says nothing of the effect; "
+                   "ruled out by the free decays, where the other runs were not fitted.");
 }
 
 void add_missing(ReportPage& page, const json& missing, const std::string& title) {
@@ -109,6 +110,15 @@ void add_closest(ReportPage& page, const json& closest) {
   if (effects.empty()) return;
   page.add_text(fmt::format("The set that comes closest removes {:.0f} % of the excess, {}:", 100 * number_of(closest, "share_of_excess_removed"), text_of(closest, "not_named")));
   add_missing(page, effects, "Parameters of the set that comes closest");
+}
+
+/// In numbers what would explain what is left.
+void add_forces(ReportPage& page, const json& forces) {
+  std::vector<std::vector<std::string>> rows;
+  for (const json& f : forces)
+    rows.push_back({file_name(text_of(f, "run")), with_error(number_of(f, "rms"), number_of(f, "standard_deviation")), plain(number_of(f, "reading_as_force"), 4), text_of(f, "unit"),
+                    f.value("out_of_proportion", false) ? "out of proportion: the rig hardly answers a force there; what is missing is no force" : ""});
+  if (!rows.empty()) page.add_table("The force that would explain what is left", {"run", "force (r.m.s.) ± its error", "all that the gauge reads, as a steady force", "unit", "remark"}, rows);
 }
 
 /// What the rig's parameters would have been without the effect.
@@ -132,7 +142,7 @@ void add_improvement(ReportPage& page, const json& improvement) {
   }
   if (rows.empty()) return;
   page.add_table("Residuals before and after", {"run", "", "before (r.m.s.)", "after (r.m.s.)", "noise (std)", "unit", "before / noise", "after / noise"}, rows,
-                 fmt::format("Before: {}. `unrig fit` gives all runs their full weight and may leave less of these, and more of the others. BIC {} before, {} after.", rig_alone,
+                 fmt::format("Before: the rig with nothing added; of runs that were not fitted, predicted by {}. BIC {} before, {} after.", rig_alone,
                              plain(number_of(improvement, "bic_before"), 7), plain(number_of(improvement, "bic_after"), 7)));
 }
 
@@ -231,6 +241,7 @@ std::optional<Models> read_models(ReportPage& page, const json& result, const st
     return std::nullopt;
   }
   Models models{read_rig(*rig_file), {}, read_fit(fit, path)};
+  if (!can_be_drawn(page, models.after, models.rig, path)) return std::nullopt;
   models.before = models.after;
   models.before.effects.clear();
   for (const json& p : member(result, "price_of_ignorance", json::array()))
@@ -241,7 +252,7 @@ std::optional<Models> read_models(ReportPage& page, const json& result, const st
 
 /// The load cells and whatever else was fitted, without the angle, which both models follow.
 void add_models(ReportPage& page, const Models& models, const Run& run, const std::string& path) {
-  warn_of_another(page, models.after, run, path);
+  warn_of_another(page, models.after, models.rig, run, path);
   const std::vector<FitTrace> after = fit_traces(models.rig, models.after, run);
   const std::vector<FitTrace> before = models.after.effects.empty() ? after : fit_traces(models.rig, models.before, run);
   const VectorXd time = VectorXd::LinSpaced(run.samples(), run.start, run.time(run.samples() - 1));
@@ -286,10 +297,13 @@ void add_diagnosis(ReportPage& page, const json& result, const std::string& path
   add_places(page, result["mismatch"]);
   add_missing(page, result["missing"], "Parameters of what was missing");
   add_closest(page, member(result, "closest", json::object()));
+  if (const std::string search = text_of(result, "search_summary"); !search.empty()) page.add_text("Warning: " + search);
+  add_forces(page, member(result, "missing_force", json::array()));
   add_ranking(page, member(result, "ranking", json::array()));
   const json improvement = member(result, "improvement", json::object());
   add_improvement(page, improvement);
   add_price(page, member(result, "price_of_ignorance", json::array()));
+  add_provenance(page, result);
   const std::optional<Models> models = read_models(page, result, path, options);
   std::string drawn;  // a run has one entry for each of its channels
   for (const json& run : member(improvement, "runs", json::array())) {

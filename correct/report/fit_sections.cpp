@@ -104,7 +104,7 @@ void add_traces(ReportPage& page, const Run& run, std::vector<FitTrace> traces) 
     page.add_plot({trace.name + ": recording and fit", "time [s]", labelled(trace.name, trace.unit), time, {{"recording", 0, trace.measured}, {"fit", 2, trace.model, {}, true}}, run.file});
     page.add_plot({trace.name + ": residual", "time [s]", labelled("recording − fit", trace.unit), time,
                    {{"residual", 1, left}, {"noise", 0, VectorXd::Zero(time.size()), VectorXd::Constant(time.size(), trace.noise), true}}, run.file,
-                   fmt::format("The band is the channel's own noise, {:.3g} {}.", trace.noise, trace.unit), false, false, 180, {}, trace.measured});
+                   fmt::format("The band is twice the channel's own noise of {:.3g} {}, to either side.", trace.noise, trace.unit), false, false, 180, {}, trace.measured});
   }
   const FitTrace& first = traces.front();
   add_spectra(page, first.name + ": spectra before and after", run.dt, first.unit, {"recording", 0, first.measured}, {"residual", 1, first.measured - first.model},
@@ -125,6 +125,7 @@ void add_fit(ReportPage& page, const json& result, const std::string& path, cons
   const json runs = result.value("runs", json::array());
   add_runs(page, runs);
   add_correlations(page, result);
+  add_provenance(page, result);
 
   const auto rig_file = found_file(text_of(result, "rig"), path, options);
   const auto missing = [&](const std::string& what) {
@@ -134,6 +135,7 @@ void add_fit(ReportPage& page, const json& result, const std::string& path, cons
   };
   if (!rig_file) return missing("The rig \"" + text_of(result, "rig") + "\"");
   const Rig rig = read_rig(*rig_file);
+  if (!can_be_drawn(page, fit, rig, path)) return;
   for (const std::string& name : fit.runs) {
     const auto file = found_file(name, path, options);
     if (!file) {
@@ -141,7 +143,7 @@ void add_fit(ReportPage& page, const json& result, const std::string& path, cons
       continue;
     }
     const Run run = read_run(*file);
-    warn_of_another(page, fit, run, path);
+    warn_of_another(page, fit, rig, run, path);
     add_traces(page, run, fit_traces(rig, fit, run));
   }
 }

@@ -1,5 +1,7 @@
 #include "correct/report/fit_traces.h"
 
+#include <algorithm>
+
 #include <fmt/format.h>
 
 #include "core/command.h"
@@ -8,8 +10,18 @@
 
 namespace unrig {
 
-void warn_of_another(ReportPage& page, const FittedRig& fit, const Run& run, const std::string& result) {
-  if (!fit.had_other_readings(run)) return;
+bool can_be_drawn(ReportPage& page, const FittedRig& fit, const Rig& rig, const std::string& result) {
+  const std::vector<std::string> parts = fit.rig_differs_in(rig);
+  if (parts.empty()) return true;
+  const bool can = std::find(parts.begin(), parts.end(), "structure") == parts.end();
+  const std::string text = fmt::format("The rig \"{}\" has {}; {}. Fit it again, or say with --data where the old one is.", rig.file, other_rig(rig, fit), can ? "the plots show what the fit makes of it" : "its plots are left out");
+  warn(result + ": " + text);
+  page.add_text("Warning: " + text);
+  return can;
+}
+
+void warn_of_another(ReportPage& page, const FittedRig& fit, const Rig& rig, const Run& run, const std::string& result) {
+  if (!fit.had_other_readings(run, rig)) return;
   const std::string text = fmt::format("The recording \"{}\" has other readings or conditions than the one that was fitted; its plots show what the fit makes of these. Fit it again, or say with --data where the old one is.", run.file);
   warn(result + ": " + text);
   page.add_text("Warning: " + text);

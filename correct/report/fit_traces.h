@@ -9,8 +9,10 @@
 
 namespace unrig {
 
-/// Says so on the page and to the user where the recording is not the one that was fitted, or has changed since: `result` is drawn beside it all the same.
-void warn_of_another(ReportPage& page, const FittedRig& fit, const Run& run, const std::string& result);
+/// Say so on the page and to the user where rig or recording are not those that were fitted, or have changed since: `result` is drawn beside them all the same. False where the rig
+/// has another structure, in which the fit's parameters have no meaning.
+bool can_be_drawn(ReportPage& page, const FittedRig& fit, const Rig& rig, const std::string& result);
+void warn_of_another(ReportPage& page, const FittedRig& fit, const Rig& rig, const Run& run, const std::string& result);
 
 /// A fitted channel of a run: what was recorded and what the model says, in SI.
 struct FitTrace {

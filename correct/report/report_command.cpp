@@ -3,10 +3,14 @@
 #include <CLI/CLI.hpp>
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <vector>
+
 #include "core/command.h"
 #include "core/command_line.h"
 #include "core/error.h"
 #include "core/given_files.h"
+#include "core/provenance.h"
 #include "core/text_file.h"
 #include "correct/report/result_files.h"
 #include "fit/simulated_run.h"
@@ -33,8 +37,40 @@ void add_json(ReportPage& page, const std::string& text, const std::string& path
   throw InputError({path, 0}, kind.empty() ? "no key \"unrig\"" : "a result of the kind \"" + kind + "\"", wanted, "");
 }
 
-void add_result(ReportPage& page, const std::string& path, const ReportOptions& options) {
+/// What is given of the two tables that one call of `unrig correct` writes.
+struct Pairs {
+  struct Table {
+    std::string path, made_by;
+  };
+  std::vector<Table> corrected, indicial;
+
+  void take(const std::string& path, const std::string& header) {
+    const std::size_t at = header.find(MadeBy::prefix);
+    if (at == std::string::npos) return;
+    const std::size_t first = at + MadeBy::prefix.size();
+    const Table table{path, header.substr(first, header.find(',', first) - first)};
+    if (header.starts_with("semichords,indicial")) indicial.push_back(table);
+    else corrected.push_back(table);
+  }
+
+  /// Throws InputError where a load and a response of one recording come of two calls: one of the files was replaced and the other was not.
+  void check() const {
+    const auto lonely = [](const Table& table, const std::vector<Table>& others) {
+      return std::none_of(others.begin(), others.end(), [&](const Table& other) { return other.made_by == table.made_by; });
+    };
+    for (const Table& load : corrected)
+      for (const Table& response : indicial) {
+        if (!lonely(load, indicial) || !lonely(response, corrected)) continue;
+        if (MadeBy::of_column(load.made_by).run == MadeBy::of_column(response.made_by).run)
+          throw InputError({response.path, 0}, "another call of `unrig correct` wrote it than " + load.path + ", of the same recording", "wanted the two that one call wrote: they rest on one estimate", "Correct the run again, with -o and --indicial.");
+        warn(fmt::format("{} and {} are of different recordings", load.path, response.path));
+      }
+  }
+};
+
+void add_result(ReportPage& page, const std::string& path, const ReportOptions& options, Pairs& pairs) {
   const std::string text = read_text(path), header = text.substr(0, text.find('\n'));
+  pairs.take(path, header);
   if (const std::size_t first = text.find_first_not_of(" \t\r\n"); first != std::string::npos && text[first] == '{') return add_json(page, text, path, options);
   if (header.starts_with("semichords,indicial")) return add_indicial(page, text, path);
   if (header.find(",from_inputs") != std::string::npos) return add_modal_load(page, text, path);
@@ -65,11 +101,13 @@ int report_command(int argc, char** argv) {
     for (const std::string& path : results) title += (title.empty() ? "" : ", ") + file_name(path);
   ReportPage page(title);
   Progress progress;
+  Pairs pairs;
   for (const std::string& path : results) {
     progress("drawing " + file_name(path));
-    add_result(page, path, options);
+    add_result(page, path, options, pairs);
   }
   progress.clear();
+  pairs.check();
   const std::string html = page.html();
   write_text(output, html);
   fmt::print("{}: {} result{}, {:.2f} MB\n", output, results.size(), results.size() == 1 ? "" : "s", static_cast<double>(html.size()) / 1e6);

@@ -50,6 +50,12 @@ std::string text_of(const json& object, const char* key) {
   return object.contains(key) && object[key].is_string() ? object[key].get<std::string>() : "";
 }
 
+void add_provenance(ReportPage& page, const Provenance& made) {
+  if (!made.program.empty()) page.add_text(fmt::format("Made by {}: {}", made.program, made.command));
+}
+
+void add_provenance(ReportPage& page, const json& result) { add_provenance(page, Provenance{text_of(result, "program"), text_of(result, "command")}); }
+
 void add_warnings(ReportPage& page, const json& result) {
   for (const json& warning : result.value("warnings", json::array()))
     if (warning.is_string()) page.add_text("Warning: " + warning.get<std::string>());

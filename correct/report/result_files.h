@@ -5,6 +5,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include "core/provenance.h"
 #include "correct/report/report_page.h"
 
 namespace unrig {
@@ -29,6 +30,9 @@ std::string text_of(const nlohmann::json& object, const char* key);
 /// Up to `digits` digits, an em dash where it is not finite.
 std::string plain(double x, int digits = 5);
 
+/// What made a result; nothing where it does not say.
+void add_provenance(ReportPage& page, const Provenance& made);
+void add_provenance(ReportPage& page, const nlohmann::json& result);
 /// The `warnings` of a result, as texts of the section.
 void add_warnings(ReportPage& page, const nlohmann::json& result);
 

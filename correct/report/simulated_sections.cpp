@@ -116,6 +116,7 @@ void add_simulated(ReportPage& page, const std::string& text, const std::string&
   const Run run = parse_run(text, path);
   const SimulatedRun simulated = *simulated_run(text);
   page.add_section("Simulation: " + file_name(path));
+  add_provenance(page, simulated.made_by.provenance);
   add_recipe(page, simulated.recipe);
   const std::optional<Run> recorded = recording_of(page, run, simulated.of_run, path, options);
   add_verdict(page, run, recorded, file_name(path));

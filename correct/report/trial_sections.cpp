@@ -79,6 +79,7 @@ void add_trial(ReportPage& page, const json& result, const std::string& path) {
   add_confusion(page, result.at("confusion"));
   add_sizes(page, result.at("effects"));
   add_failures(page, trials);
+  add_provenance(page, result);
 }
 
 }  // namespace unrig

@@ -13,6 +13,7 @@
 #include "fit/diagnose/selection.h"
 #include "fit/effect_search.h"
 #include "fit/fit_description.h"
+#include "fit/run_order.h"
 
 namespace unrig {
 namespace {
@@ -65,11 +66,35 @@ double power_over_noise(const std::vector<ImprovedRun>& runs, double ImprovedRun
   return sum;
 }
 
+/// The fit with nothing missing and every run at its full weight, from where the baseline stands; `thorough`: or from first guesses and the starts around them, as `unrig fit` searches, where that leaves less. Whether it
+/// leaves so much less that the baseline, from which all else was searched, was no place to begin from.
+struct PlainFit {
+  Arrival arrival;
+  bool baseline_was_lost = false;
+};
+PlainFit plain_fit(const FitProblem& problem, const Arrival& baseline, bool thorough) {
+  PlainFit plain{baseline};
+  for (RunResidual& run : plain.arrival.joint.runs()) run.temper(1);
+  solve(plain.arrival);
+  if (!thorough) return plain;
+  Arrival anew = arrive(problem, baseline.model);
+  constexpr double hardly_less = 0.9;
+  const double before = plain.arrival.joint.chi2(), after = anew.joint.chi2();
+  plain.baseline_was_lost = after < hardly_less * before;
+  if (after < before) plain.arrival = std::move(anew);
+  return plain;
+}
+
 /// Both fits in full, and what they leave of the fitted runs.
 void describe(const DiagnoseProblem& problem, const FitProblem& fit_problem, const Trial& baseline, const Trial& best, Diagnosis& d) {
   FitProblem after = fit_problem;
   after.effects = best.effects;
   Arrival before_arrival = baseline.arrival, after_arrival = best.arrival;
+  if (d.mismatch.found) {
+    PlainFit plain = plain_fit(fit_problem, baseline.arrival, d.unexplained);
+    before_arrival = std::move(plain.arrival);
+    if (plain.baseline_was_lost) d.not_followed.insert(d.not_followed.begin(), std::vector<std::string>{});
+  }
   d.before = describe_fit(before_arrival, fit_problem, d.mismatch.found ? Settle::nothing : Settle::noise);  // a fit that explains nothing deserves no refinement
   d.after = best.effects.empty() ? d.before : describe_fit(after_arrival, after, best.reduced_chi2() < twice_the_noise ? Settle::noise : Settle::nothing);
   d.bic_after = bic_difference(best, baseline) + (d.bic_before = d.before.bic());
@@ -130,7 +155,9 @@ void refuse_short_runs(const JointProblem& joint) {
 
 }  // namespace
 
-Diagnosis diagnose(const DiagnoseProblem& problem) {
+namespace {
+
+Diagnosis diagnose_in_order(const DiagnoseProblem& problem) {
   const auto begin = std::chrono::steady_clock::now();
   const auto tell = [&](const std::string& what) {
     if (problem.progress) problem.progress(what);
@@ -155,12 +182,17 @@ Diagnosis diagnose(const DiagnoseProblem& problem) {
   const bool predicts = best.effects.empty() || power_over_noise(unseen, &ImprovedRun::rms_after) <= power_over_noise(unseen, &ImprovedRun::rms_before);
   d.unexplained = d.mismatch.found && !(clean && predicts);
 
+  if (d.unexplained)
+    for (const Candidate& c : d.ranking)
+      if (c.search == Search::failed) d.not_followed.push_back(c.effects);
+
   if (!problem.verdict_only) {
     tell("describing the result");
     describe(problem, fit_problem, baseline, best, d);
     for (const ImprovedRun& run : unseen) d.runs.push_back(run);
     if (d.unexplained) d.missing_force = missing_forces(best.arrival.joint);
   }
+  if (!d.not_followed.empty()) d.search = Search::failed;
   if (!best.effects.empty()) {
     d.naming = naming_of(best, baseline, clean, predicts);
     if (d.naming == Naming::named) name_equivalent(baseline, best, selection.tried(), problem.verdict_only, d);
@@ -168,6 +200,48 @@ Diagnosis diagnose(const DiagnoseProblem& problem) {
     (d.naming == Naming::named ? d.missing : d.closest) = effects_of(best, d);
   }
   d.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+  return d;
+}
+
+void sort_mismatch(const GivenOrder& given, Mismatch& m) {
+  given.sort(m.channels, [](const ChannelMismatch& c) { return c.run; });
+  const Mismatch was = m;
+  const std::vector<std::size_t> places = given.places(m.runs, [](const std::string& file) { return file; });
+  for (std::size_t i = 0; i < places.size(); ++i) {
+    m.runs[i] = was.runs[places[i]];
+    m.time[i] = was.time[places[i]];
+    m.frequency[i] = was.frequency[places[i]];
+    m.state[i] = was.state[places[i]];
+  }
+}
+
+/// What was found in the order of the search, told in that in which the runs were given.
+void tell_as_given(const GivenOrder& given, std::size_t runs, Diagnosis& d) {
+  sort_mismatch(given, d.mismatch);
+  sort_mismatch(given, d.remaining);
+  for (std::vector<MissingEffect>* effects : {&d.missing, &d.closest})
+    for (MissingEffect& m : *effects) given.sort_by_name(m.parameters);
+  const auto fitted = [](const ImprovedRun& run) { return !run.heldout; };
+  const auto unseen = std::stable_partition(d.runs.begin(), d.runs.end(), fitted);
+  std::vector<ImprovedRun> seen(d.runs.begin(), unseen), others(unseen, d.runs.end());
+  for (std::vector<ImprovedRun>* part : {&seen, &others}) given.sort(*part, [](const ImprovedRun& run) { return run.file; });
+  d.runs = std::move(seen);
+  d.runs.insert(d.runs.end(), others.begin(), others.end());
+  given.sort(d.maps, [](const ResidualMaps& m) { return m.run; });
+  given.sort(d.missing_force, [](const MissingForce& f) { return f.run; });
+  for (FitResult* fit : {&d.before, &d.after})
+    if (fit->runs.size() == runs) tell_as_given(given, *fit);  // a verdict alone has none
+}
+
+}  // namespace
+
+Diagnosis diagnose(const DiagnoseProblem& problem) {
+  const std::vector<std::size_t> order = order_of_search(problem.runs);
+  if (is_as_given(order)) return diagnose_in_order(problem);
+  DiagnoseProblem ordered = problem;
+  ordered.runs = in_order(problem.runs, order);
+  Diagnosis d = diagnose_in_order(ordered);
+  tell_as_given(GivenOrder(problem.runs), problem.runs.size(), d);
   return d;
 }
 

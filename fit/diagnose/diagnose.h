@@ -31,6 +31,10 @@ struct DiagnoseProblem {
   std::function<void(const std::string&)> progress;
 };
 
+/// How the search for the best fit with a set of effects ended. A set with one effect more can do all that the set without it does. Where it leaves a decisively lower likelihood all the same
+/// (-2 ln L higher by more than 10), the search has failed, and what the set would explain is not known. `ruled_out`: free decays speak against it, so that the other runs were not searched.
+enum class Search { complete, ruled_out, failed };
+
 /// A set of effects that was tried.
 struct Candidate {
   std::vector<std::string> effects;
@@ -38,6 +42,7 @@ struct Candidate {
   double delta_bic = 0;      ///< against the fit with nothing missing; negative is better
   double probability = 0;    ///< exp(-BIC/2) over the sum of it over all sets tried
   double score = 0;          ///< share of the excess of chi-square that one linear step promised to remove (first round only)
+  Search search = Search::complete;
 };
 
 struct MissingEffect {
@@ -47,7 +52,8 @@ struct MissingEffect {
   std::vector<FittedParameter> parameters;
 };
 
-/// A channel of a run before and after the effects that were found, before: what `Diagnosis::before` leaves, a fit with runs that it cannot explain weighted down; of a run that was not fitted its first fitted channel.
+/// A channel of a run before and after the effects that were found, before: what `Diagnosis::before` leaves. Of a run that was not fitted its first fitted channel; before: predicted by a fit with runs that it cannot
+/// explain weighted down.
 struct ImprovedRun {
   std::string file, channel, unit;
   bool heldout = false;   ///< not fitted but predicted
@@ -62,6 +68,8 @@ struct Diagnosis {
   std::vector<std::vector<std::string>> equivalent;  ///< sets that these runs cannot tell from the winner
   std::vector<std::optional<SeparatingRecording>> separated_by;  ///< and the recording that would, for each of them
   bool unexplained = false;            ///< a significant mismatch remains
+  Search search = Search::complete;    ///< of all; failed: something is unexplained, and it may be because of what was not followed
+  std::vector<std::vector<std::string>> not_followed;  ///< then: the sets whose own search failed; an empty set: the rig with nothing added
   std::vector<MissingEffect> closest;  ///< where nothing is named: the best set that was tried
   double removed_by_closest = 0;       ///< share of the excess
   Naming naming = Naming::named;       ///< and why it is not named
@@ -70,7 +78,8 @@ struct Diagnosis {
   std::vector<ImprovedRun> runs;
   std::vector<ResidualMaps> maps;      ///< of what the best fit with nothing missing leaves, per fitted run
   std::vector<Candidate> ranking;
-  FitResult before, after;
+  FitResult before;   ///< with nothing missing, all runs at their full weight, as `unrig fit` has it
+  FitResult after;
   std::vector<MissingForce> missing_force;  ///< where something is unexplained: what would explain it
   double seconds = 0;
 };
@@ -84,6 +93,7 @@ struct Diagnosis {
 /// with amplitudes of their own in every run), and where runs that were not fitted are predicted better with it than without: those held out or, where there are
 /// none, each fitted run from the others. Otherwise the mismatch is unexplained, and the force is given that would explain it.
 ///
+/// No digit of it depends on the order of the runs (fit/run_order.h).
 /// Throws InputError where a run does not belong to the rig.
 Diagnosis diagnose(const DiagnoseProblem& problem);
 

@@ -8,7 +8,8 @@
 #include "core/error.h"
 #include "core/given_files.h"
 #include "core/in_parallel.h"
-#include "core/text_file.h"
+#include "core/provenance.h"
+#include "core/together.h"
 #include "fit/diagnose/diagnose.h"
 #include "fit/diagnose/diagnosis_files.h"
 #include "fit/effect_option.h"
@@ -23,6 +24,15 @@ void check_heldout(const std::vector<std::string>& heldout, const std::vector<st
     for (const std::string& run : fitted)
       if (same_file(path, run))
         throw InputError({path, 0}, "--heldout is among the runs too", "wanted another: a run that was fitted cannot test the prediction", "Leave it out of the runs, or leave --heldout away: then each run is left out in turn.");
+}
+
+/// A copy of a run under another name is that run.
+void check_recordings(const DiagnoseProblem& problem) {
+  check_recorded_once(problem.runs, problem.rig);
+  check_recorded_once(problem.heldout, problem.rig);
+  for (const Run& run : problem.heldout)
+    if (const Run* fitted = same_recording(run, problem.runs, problem.rig))
+      throw InputError({run.file, 0}, "--heldout holds the same readings as the run " + fitted->file, "wanted another: a run that was fitted cannot test the prediction", "Leave one of them out.");
 }
 
 }  // namespace
@@ -54,15 +64,20 @@ int diagnose_command(int argc, char** argv) {
   problem.rig = read_rig(rig);
   for (const std::string& path : runs) problem.runs.push_back(read_run(path));
   for (const std::string& path : heldout) problem.heldout.push_back(read_run(path));
+  check_recordings(problem);
   problem.effects = effects_of_option("--effects", ids);
   refuse_idle("--effects", problem.effects, problem.rig, problem.runs);
   Progress progress;
   problem.progress = [&](const std::string& what) { progress(what); };
-  const Diagnosis diagnosis = diagnose(problem);
+  Diagnosis diagnosis = diagnose(problem);
+  const Provenance made = provenance_of(argc, argv, {"--fit"});
+  diagnosis.after.program = made.program;
+  diagnosis.after.command = made.command;
   progress.clear();
   for (const std::string& warning : problem.rig.warnings) warn(warning);
-  write_text(output, to_json(diagnosis));
-  if (!fit_output.empty()) write_text(fit_output, to_json(diagnosis.after));
+  const auto whole = [](const std::string& text) { return [&text](const TextSink& sink) { sink(text); }; };
+  const std::string told = to_json(diagnosis), fitted = fit_output.empty() ? std::string() : to_json(diagnosis.after);
+  write_together({{output, whole(told)}, {fit_output, whole(fitted)}});
   fmt::print("{}", report(diagnosis));
   fmt::print("    {:.1f} s\n", diagnosis.seconds);
   return diagnosis.unexplained ? exit_no_answer : exit_done;

@@ -9,6 +9,7 @@
 
 #include "core/text_file.h"
 #include "fit/fit_files.h"
+#include "fit/out_of_proportion.h"
 
 namespace unrig {
 namespace {
@@ -65,9 +66,41 @@ std::string why_not_named(Naming naming) {
   return "";
 }
 
+const char* name_of(Search search) {
+  switch (search) {
+    case Search::complete: return "complete";
+    case Search::ruled_out: return "ruled out";
+    case Search::failed: break;
+  }
+  return "failed";
+}
+
+/// Behind a set in the list of those tried.
+const char* in_words(Search search) {
+  switch (search) {
+    case Search::complete: return "";
+    case Search::ruled_out: return "  ruled out by the free decays, not fitted to the other runs";
+    case Search::failed: break;
+  }
+  return "  the search lost its way: no verdict on this set";
+}
+
+/// What a search that failed could not follow, and what that means for the verdict; empty where none did.
+std::string search_words(const Diagnosis& d) {
+  if (d.search != Search::failed) return "";
+  std::vector<std::string> sets;
+  for (const std::vector<std::string>& set : d.not_followed)
+    if (!set.empty()) sets.push_back(set_name(set));
+  std::string text;
+  if (sets.size() < d.not_followed.size()) text = "The rig with nothing added was searched from a fit that leaves far more than another does. ";
+  if (!sets.empty()) text += fmt::format("With {} added the search ended with more left than without: it lost its way, and whether that explains these runs is not known. ", fmt::join(sets, "; "));
+  return text + "Unexplained is what the search left, not what all effects leave. Look at rig file and runs, diagnose fewer runs, or name candidates with --effects.";
+}
+
 std::string verdict(const Diagnosis& d) {
   if (!d.mismatch.found) return "Nothing is missing: " + d.mismatch.summary + ".";
-  if (d.missing.empty()) return "There is a mismatch that no known effect removes: unexplained.";
+  if (d.missing.empty())
+    return d.search == Search::failed ? "There is a mismatch, and the search for what removes it failed in part: unexplained." : "There is a mismatch that no known effect removes: unexplained.";
   std::vector<std::string> ids;
   for (const MissingEffect& m : d.missing) ids.push_back(m.effect);
   return fmt::format("Missing is {}{}.", fmt::join(ids, " and "), d.unexplained ? "; something remains unexplained" : "");
@@ -116,12 +149,13 @@ std::string to_json(const Diagnosis& d) {
       if (m.run == r.file && m.channel == r.channel && !r.heldout && !r.left_out) runs.back()["map"] = map_json(m);
   }
   for (const Candidate& c : d.ranking)
-    ranking.push_back({{"effect", set_name(c.effects)}, {"score", number(c.score)}, {"reduced_chi2", number(c.reduced_chi2)}, {"delta_bic", number(c.delta_bic)}, {"probability", number(c.probability)}});
+    ranking.push_back({{"effect", set_name(c.effects)}, {"score", number(c.score)}, {"reduced_chi2", number(c.reduced_chi2)}, {"delta_bic", number(c.delta_bic)}, {"probability", number(c.probability)}, {"search", name_of(c.search)}});
   ordered_json forces = ordered_json::array();
   for (const MissingForce& f : d.missing_force) {
     std::vector<double> value(f.value.begin(), f.value.end());
     for (double& v : value) v = std::round(v / f.standard_deviation * 100) / 100 * f.standard_deviation;  // to a hundredth of its error
-    forces.push_back({{"run", f.run}, {"unit", "N"}, {"at", "calibration element"}, {"dt", f.dt}, {"standard_deviation", number(f.standard_deviation)}, {"value", value}});
+    forces.push_back({{"run", f.run}, {"unit", "N"}, {"at", "calibration element"}, {"dt", f.dt}, {"standard_deviation", number(f.standard_deviation)}, {"rms", number(f.rms())}, {"reading_as_force", number(f.as_read)},
+                      {"out_of_proportion", f.out_of_proportion()}, {"value", value}});
   }
   ordered_json shifts = ordered_json::array();
   for (const FittedParameter& b : d.before.parameters)
@@ -132,12 +166,18 @@ std::string to_json(const Diagnosis& d) {
   for (const std::optional<SeparatingRecording>& s : d.separated_by)
     separated.push_back(s ? ordered_json{{"recording", s->what}, {"difference_over_noise", number(s->difference)}, {"as_recorded", number(s->now)}} : ordered_json(nullptr));
   const ordered_json json = {{"unrig", "diagnosis"},
+                             {"program", d.after.program},
+                             {"command", d.after.command},
+                             {"rig_fingerprint", d.after.rig_fingerprint},
                              {"verdict", verdict(d)},
                              {"mismatch", mismatch_json(d.mismatch)},
                              {"missing", effects_json(d.missing)},
                              {"equivalent", d.equivalent},
                              {"separated_by", separated},
                              {"unexplained", d.unexplained},
+                             {"search", name_of(d.search)},
+                             {"not_followed", d.not_followed},
+                             {"search_summary", search_words(d)},
                              {"closest", {{"effects", effects_json(d.closest)}, {"share_of_excess_removed", number(d.removed_by_closest)}, {"not_named", d.closest.empty() ? "" : why_not_named(d.naming)}}},
                              {"remaining", mismatch_json(d.remaining)},
                              {"improvement", {{"bic_before", number(d.bic_before)}, {"bic_after", number(d.bic_after)}, {"runs", runs}}},
@@ -154,18 +194,22 @@ std::string report(const Diagnosis& d) {
   text += effects_text(d.missing);
   for (std::size_t i = 0; i < d.equivalent.size(); ++i) text += "    " + cannot_tell(d.equivalent[i], d.separated_by[i]) + "\n";
   if (d.unexplained) text += "[[Unexplained]]\n    " + d.remaining.summary + "\n";
+  if (const std::string words = search_words(d); !words.empty()) text += "    " + words + "\n";
+  for (const std::string& sentence : out_of_proportion(d.after.parameters)) text += "    " + sentence + "\n";
   if (!d.closest.empty()) text += fmt::format("    The set that comes closest removes {:.0f} % of the excess, {}:\n", 100 * d.removed_by_closest, why_not_named(d.naming)) + effects_text(d.closest);
-  for (const MissingForce& f : d.missing_force)
-    text += fmt::format("    what is left of {} would be explained by a force of {:.3g} N r.m.s. at the calibration element, known to {:.2g} N (diagnosis file: missing_force)\n",
-                        base_name(f.run), std::sqrt(f.value.squaredNorm() / static_cast<double>(f.value.size())), f.standard_deviation);
-  text += "[[Improvement]] r.m.s. of the residual: the rig alone, fitted with less weight for runs that it cannot explain -> with what was found\n";
+  for (const MissingForce& f : d.missing_force) {
+    text += fmt::format("    what is left of {} would be explained by a force of {:.3g} N r.m.s. at the calibration element, known to {:.2g} N (diagnosis file: missing_force)\n", base_name(f.run), f.rms(), f.standard_deviation);
+    if (f.out_of_proportion())
+      text += fmt::format("        out of proportion: all that the gauge reads there is {:.3g} N r.m.s. The rig hardly answers a force at these frequencies: what is missing is no force, but in the signal or in the rig's description\n", f.as_read);
+  }
+  text += "[[Improvement]] r.m.s. of the residual: the rig alone -> with what was found (of runs that were not fitted: predicted, from a fit of the rig alone with less weight for runs that it cannot explain)\n";
   for (const ImprovedRun& r : d.runs)
     text += fmt::format("    {:<20} {:<8} {:9.4g} -> {:9.4g} {} (noise {:.4g})\n", base_name(r.file) + (r.channel == "gauge" ? "" : ": " + r.channel), kind_of(r), r.rms_before, r.rms_after, r.unit, r.noise);
   if (std::any_of(d.runs.begin(), d.runs.end(), [](const ImprovedRun& r) { return r.aside; }))
     text += "    set aside: it crosses the corners of a law for so long that no search follows it to its end; it is judged by what laws leave of it that are trusted to within some per cent, and had no part in the fit\n";
   if (d.ranking.size() > 1) {
     text += "[[Tried]] reduced chi-square, BIC against nothing missing\n";
-    for (const Candidate& c : d.ranking) text += fmt::format("    {:<36} {:10.4g} {:12.5g}\n", set_name(c.effects), c.reduced_chi2, c.delta_bic);
+    for (const Candidate& c : d.ranking) text += fmt::format("    {:<36} {:10.4g} {:12.5g}{}\n", set_name(c.effects), c.reduced_chi2, c.delta_bic, in_words(c.search));
   }
   return text;
 }

@@ -48,6 +48,12 @@ MatrixXd riccati(MatrixXd A, MatrixXd S, MatrixXd X) {
   return X;
 }
 
+/// Of a steady unit force.
+double steady_reading(const Walk& walk) {
+  const Index last = walk.F.rows() - 1;
+  return std::abs((walk.H.head(last) * (MatrixXd::Identity(last, last) - walk.F.topLeftCorner(last, last)).fullPivLu().solve(walk.F.col(last).head(last)))(0) + walk.H[last]);
+}
+
 struct Filter {
   MatrixXd P;         // covariance of the predicted state
   VectorXd gain;      // P H^T / variance
@@ -112,8 +118,7 @@ MissingForce estimate_force(const LinearSystem& system, double dt, const VectorX
   double range = noise;
   for (const double r : residual)
     if (std::isfinite(r)) range = std::max(range, std::abs(r));
-  const double steady = std::abs((walk.H.head(last) * (MatrixXd::Identity(last, last) - walk.F.topLeftCorner(last, last)).fullPivLu().solve(walk.F.col(last).head(last)))(0) + walk.H[last]);
-  const double unit = std::max(steady, 1e-6);
+  const double unit = std::max(steady_reading(walk), 1e-6);
   const double low = std::log(1e-3 * noise / unit / std::sqrt(static_cast<double>(residual.size()))), high = std::log(10 * range / unit);
   const double roughness = std::exp(least_between(low, high, [&](double q) { return deviance(walk, std::exp(q), noise, residual); }));
 
@@ -122,7 +127,7 @@ MissingForce estimate_force(const LinearSystem& system, double dt, const VectorX
   const VectorXd e = innovations(walk, filter, residual, &states);
   // Adjoint of the filter, backwards: what later samples say.
   const MatrixXd kept = MatrixXd::Identity(n, n) - filter.gain * walk.H, carried = walk.F * kept;
-  MissingForce force{"", dt, VectorXd(residual.size()), 0, roughness / std::sqrt(dt)};
+  MissingForce force{"", dt, VectorXd(residual.size()), 0, roughness / std::sqrt(dt), 0};
   VectorXd later = VectorXd::Zero(n);
   for (Index k = residual.size() - 1; k >= 0; --k) {
     if (std::isfinite(residual[k]))
@@ -142,6 +147,21 @@ MissingForce estimate_force(const LinearSystem& system, double dt, const VectorX
   force.standard_deviation = std::sqrt(std::max(0.0, filter.P(last, last) - (filter.P * L * filter.P)(last, last)));
   return force;
 }
+
+namespace {
+
+/// What a gauge reads in all, its mean removed, as the steady force that would read so (r.m.s.).
+double as_steady_force(const LinearSystem& system, const RunResidual& run) {
+  const VectorXd& gauge = run.run().channel("gauge").value;
+  double count = 0, sum = 0, squares = 0;
+  for (Index k = 0; k < gauge.size(); ++k)
+    if (run.channel_weight(0)[k] > 0 && std::isfinite(gauge[k])) ++count, sum += gauge[k], squares += gauge[k] * gauge[k];
+  const double steady = steady_reading(walk_of(system, run.run().dt));
+  if (!(steady > 0) || count == 0) return 0;
+  return std::sqrt(std::max(0.0, squares / count - std::pow(sum / count, 2))) / steady;
+}
+
+}  // namespace
 
 std::vector<MissingForce> missing_forces(const JointProblem& joint) {
   std::vector<MissingForce> forces(joint.runs().size());
@@ -164,6 +184,7 @@ std::vector<MissingForce> missing_forces(const JointProblem& joint) {
       if (!(run.channel_weight(0)[k] > 0)) left[k] = std::nan("");
     forces[r] = estimate_force(system, run.run().dt, left, run.sigma(0));
     forces[r].run = run.run().file;
+    forces[r].as_read = as_steady_force(system, run);
   });
   std::erase_if(forces, [](const MissingForce& f) { return f.run.empty(); });
   return forces;

@@ -1,5 +1,6 @@
 #pragma once
 #include <Eigen/Core>
+#include <cmath>
 #include <string>
 #include <vector>
 
@@ -14,6 +15,11 @@ struct MissingForce {
   Eigen::VectorXd value;      ///< N, per sample; sees the whole record, before and behind
   double standard_deviation = 0;  ///< N, of each sample away from the ends
   double roughness = 0;       ///< N/sqrt(s): what the force changes by in one second, estimated
+  double as_read = 0;         ///< N, r.m.s.: the whole recording, its mean removed, read as a steady force; 0 where none is read at all
+
+  double rms() const { return std::sqrt(value.squaredNorm() / static_cast<double>(value.size())); }
+  /// Larger than all that the gauge read: what is missing sits at frequencies at which the rig hardly answers a force, or answers one out of phase, and is none.
+  bool out_of_proportion() const { return as_read > 0 && rms() > as_read; }
 };
 
 /// Input estimation: the force is a random walk, x' = A x + B f, df = q dw, gauge residual = C x + D f + noise; q is the one that makes the residual most likely, the

@@ -97,6 +97,11 @@ Trial in_finer_steps(Trial trial) {
 
 }  // namespace
 
+Search search_of(const Trial& trial, const Trial& base) {
+  if (trial.ruled_out) return Search::ruled_out;
+  return !effect(trial.effects.back()).parameters.empty() && deviance_difference(trial, base) > decisive ? Search::failed : Search::complete;
+}
+
 Mismatch what_remains(const Trial& trial) {
   Mismatch mismatch = locate_mismatch(trial.arrival.joint);
   if (!any_aside(trial.arrival.joint) || trial.decays.chi2 < explained) return mismatch;
@@ -169,7 +174,7 @@ Trials Selection::try_one_more(const Trial& base, const Strings& hopeless) {
   }
   std::sort(linear.begin(), linear.end(), [](const Trial& a, const Trial& b) { return bic_difference(a, b) < 0; });
   std::stable_partition(linear.begin(), linear.end(), plausible);
-  for (const Trial& t : linear) ranking_.push_back({t.effects, t.reduced_chi2(), bic_difference(t, baseline_), 0, base.effects.empty() ? t.score : 0});
+  for (const Trial& t : linear) ranking_.push_back({t.effects, t.reduced_chi2(), bic_difference(t, baseline_), 0, base.effects.empty() ? t.score : 0, search_of(t, base)});
   return linear;
 }
 

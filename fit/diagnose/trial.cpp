@@ -9,6 +9,7 @@
 #include <nlohmann/json.hpp>
 
 #include "core/error.h"
+#include "core/fingerprint.h"
 #include "core/in_parallel.h"
 #include "fit/diagnose/diagnose.h"
 #include "fit/diagnose/trial_campaign.h"
@@ -145,7 +146,12 @@ TrialResult run_trials(const TrialProblem& problem) {
   TrialResult result;
   result.seed = problem.seed;
   for (const PlannedRun& run : planned) result.noise = std::max(result.noise, run.noise);
-  for (const Run& run : problem.recordings) result.recordings.push_back(run.file);
+  result.rig_file = problem.rig.file;
+  result.rig_fingerprint = fingerprint(problem.rig);
+  for (const Run& run : problem.recordings) {
+    result.recordings.push_back(run.file);
+    result.recording_fingerprints.push_back(fingerprint(run, problem.rig));
+  }
   result.outcomes.resize(static_cast<std::size_t>(problem.trials));
   std::mutex mutex;
   int done = 0;
@@ -159,7 +165,7 @@ TrialResult run_trials(const TrialProblem& problem) {
   return result;
 }
 
-std::string to_json(const TrialResult& r) {
+std::string to_json(const TrialResult& r, const Provenance& made) {
   using nlohmann::ordered_json;
   ordered_json trials = ordered_json::array(), scores = ordered_json::array();
   for (const TrialOutcome& o : r.outcomes) {
@@ -172,7 +178,8 @@ std::string to_json(const TrialResult& r) {
     scores.push_back({{"effect", id}, {"hidden", s.hidden}, {"found", s.found}, {"equivalent", s.equivalent},
                       {"smallest_found", s.found > 0 ? ordered_json(s.smallest_found) : ordered_json(nullptr)},
                       {"found_nine_in_ten_from", s.nine_in_ten > 0 ? ordered_json(s.nine_in_ten) : ordered_json(nullptr)}});
-  const ordered_json json = {{"unrig", "trial"}, {"seed", r.seed}, {"noise", {{"gauge", r.noise}, {"unit", "N"}}}, {"recordings", r.recordings}, {"nulls", r.nulls}, {"false_alarms", r.false_alarms},
+  const ordered_json json = {{"unrig", "trial"}, {"program", made.program}, {"command", made.command}, {"rig", r.rig_file}, {"rig_fingerprint", r.rig_fingerprint},
+                             {"seed", r.seed}, {"noise", {{"gauge", r.noise}, {"unit", "N"}}}, {"recordings", r.recordings}, {"recording_fingerprints", r.recording_fingerprints}, {"nulls", r.nulls}, {"false_alarms", r.false_alarms},
                              {"wrong_names", r.wrong_names}, {"misses", r.misses}, {"confusion", r.confusion}, {"effects", scores}, {"trials", trials}};
   return json.dump(2) + "\n";
 }

@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "core/provenance.h"
 #include "core/rig.h"
 #include "core/run.h"
 
@@ -54,6 +55,8 @@ struct TrialResult {
   int failures = 0;                   ///< campaigns that could not be drawn or diagnosed: in none of these counts
   unsigned seed = 0;
   std::vector<std::string> recordings;  ///< files that the simulated runs repeat
+  std::string rig_file, rig_fingerprint;          ///< core/fingerprint.h
+  std::vector<std::string> recording_fingerprints;
   double noise = 0;                     ///< of the gauge [N]; of several recordings the largest
 };
 
@@ -66,7 +69,7 @@ TrialResult run_trials(const TrialProblem& problem);
 /// "nothing", or the names with " + " between them, in alphabetical order.
 std::string name_of(std::vector<std::string> effects);
 
-std::string to_json(const TrialResult& result);
+std::string to_json(const TrialResult& result, const Provenance& made = {});
 std::string report(const TrialResult& result);
 
 }  // namespace unrig

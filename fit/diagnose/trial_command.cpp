@@ -8,6 +8,7 @@
 #include "core/error.h"
 #include "core/given_files.h"
 #include "core/in_parallel.h"
+#include "core/provenance.h"
 #include "core/text_file.h"
 #include "core/units.h"
 #include "fit/diagnose/trial.h"
@@ -43,6 +44,7 @@ int trial_command(int argc, char** argv) {
   problem.rig = read_rig(rig);
   for (const std::string& warning : problem.rig.warnings) warn(warning);
   for (const std::string& path : recordings) problem.recordings.push_back(read_run(path));
+  check_recorded_once(problem.recordings, problem.rig);
   for (const Run& run : problem.recordings)
     for (const std::string& warning : run.warnings) warn(warning);
   if (!noise.empty()) {
@@ -54,7 +56,7 @@ int trial_command(int argc, char** argv) {
   problem.progress = [&](const std::string& what) { progress(what); };
   const TrialResult result = run_trials(problem);
   progress.clear();
-  write_text(output, to_json(result));
+  write_text(output, to_json(result, provenance_of(argc, argv)));
   fmt::print("{}", report(result));
   if (result.failures == problem.trials) throw NoAnswer("no campaign could be diagnosed: " + result.outcomes.front().failure);
   return exit_done;

@@ -62,6 +62,9 @@ TEST(Report, ShowsEveryResultOfTheChain) {
     for (const json& block : data["blocks"]) {
       if (block["type"] != "plot" || block["group"] != run["file"] || block["title"] != "gauge: residual") continue;
       ++residuals;
+      // The page draws a band of two of these to either side, and the caption says of what.
+      const double noise = block["series"][1]["std"][0];
+      EXPECT_EQ(block["caption"], fmt::format("The band is twice the channel's own noise of {:.3g} N, to either side.", noise));
       double sum = 0;
       std::size_t count = 0;
       for (const json& v : block["series"][0]["v"])

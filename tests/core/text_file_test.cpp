@@ -3,7 +3,9 @@
 #include <fcntl.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <signal.h>
 #include <sys/stat.h>
+#include <sys/wait.h>
 #include <unistd.h>
 
 #include <filesystem>
@@ -12,6 +14,7 @@
 #include <thread>
 
 #include "core/error.h"
+#include "core/together.h"
 #include "tests/support/temporary_directory.h"
 
 namespace unrig {
@@ -188,6 +191,50 @@ TEST(TextFile, ANameAsLongAsTheSystemAllows) {
 TEST(InputErrorMessage, HasOneShape) {
   EXPECT_STREQ(InputError({"a.csv", 3}, "found", "wanted", "Advice.").what(), "a.csv:3: found; wanted. Advice.");
   EXPECT_STREQ(InputError({"a.csv", 0}, "found", "wanted", "").what(), "a.csv: found; wanted.");
+}
+
+TextSource of(const std::string& text) {
+  return [text](const TextSink& sink) { sink(text); };
+}
+
+TEST(Together, AllOrNone) {
+  const TemporaryDirectory directory;
+  const std::string first = directory.file("first", "old"), second = directory.file("second", "old");
+  write_together({{first, of("new")}, {"", of("not wanted")}, {second, of("new")}});
+  EXPECT_EQ(read_text(first) + read_text(second), "newnew");
+  const auto fails = [](const TextSink& sink) {
+    sink("half");
+    throw std::runtime_error("in the middle");
+  };
+  EXPECT_THROW(write_together({{first, of("newer")}, {second, fails}}), std::runtime_error);
+  EXPECT_THROW(write_together({{first, of("newer")}, {directory.path("absent/file"), of("newer")}}), InputError);
+  EXPECT_EQ(read_text(first) + read_text(second), "newnew");
+  EXPECT_EQ(files_in(directory.path("")), 2u);
+}
+
+/// In a child that does nothing but write pairs until it is told to end, at once, somewhere.
+TEST(Together, ASignalDoesNotPartThem) {
+  const TemporaryDirectory directory;
+  const std::string first = directory.path("first"), second = directory.path("second");
+  constexpr int times = 40;
+  for (int k = 0; k < times; ++k) {
+    const pid_t child = ::fork();
+    ASSERT_GE(child, 0);
+    if (child == 0)
+      for (int i = 0;; ++i) {
+        const std::string text = std::to_string(k) + " " + std::to_string(i);
+        write_together({{first, of(text)}, {second, of(text)}});
+      }
+    ::usleep(static_cast<useconds_t>(5000 + 1237 * k % 7000));
+    ::kill(child, k % 2 == 0 ? SIGTERM : SIGINT);
+    int status = 0;
+    ASSERT_EQ(::waitpid(child, &status, 0), child);
+    EXPECT_TRUE(WIFSIGNALED(status));
+    const bool one = fs::exists(first), other = fs::exists(second);  // the first child may not have come so far
+    ASSERT_EQ(one, other) << k;
+    if (one) ASSERT_EQ(read_text(first), read_text(second)) << k;
+  }
+  EXPECT_TRUE(fs::exists(first)) << "otherwise this has tested nothing";
 }
 
 }  // namespace

@@ -7,6 +7,7 @@
 #include <random>
 
 #include "core/exact_step.h"
+#include "fit/effect_search.h"
 
 namespace unrig {
 namespace {
@@ -106,6 +107,50 @@ TEST(MissingForce, NothingWhereThereIsNothing) {
   const MissingForce found = estimate_force(oscillator(), dt, white(3000, noise, 9), noise);
   EXPECT_LT(found.value.norm() / std::sqrt(3000.0), 3 * found.standard_deviation);
   EXPECT_LT(found.standard_deviation, 0.1 * noise) << "as well as the mean of a hundred of the three thousand samples";
+}
+
+TEST(MissingForce, LargerThanAllThatWasReadIsOutOfProportion) {
+  MissingForce force;
+  force.value = VectorXd::Constant(10, -277);
+  force.as_read = 35;
+  EXPECT_DOUBLE_EQ(force.rms(), 277);
+  EXPECT_TRUE(force.out_of_proportion());
+  force.as_read = 300;
+  EXPECT_FALSE(force.out_of_proportion());
+  force.as_read = 0;  // a gauge that no steady force moves
+  EXPECT_FALSE(force.out_of_proportion());
+}
+
+/// A line far above the rig's resonance, a few per cent of the whole reading: as a force it is seventy times what it reads, since the rig answers by (f0/f)^2.
+TEST(MissingForce, OfALineThatTheRigCannotAnswerIsOutOfProportion) {
+  const Rig rig = [] {
+    Rig r;
+    r.modal.push_back({mass, frequency, damping, mass * omega * omega, "N", {}});
+    return r;
+  }();
+  unrig::Run run;
+  run.file = "decay.csv";
+  run.kind = RunKind::pluck;
+  run.density = 1.2;
+  run.dt = dt;
+  constexpr Index samples = 2000;
+  constexpr double line = 25;  // Hz
+  const VectorXd noise = white(samples, 0.002, 3);
+  VectorXd gauge(samples);
+  for (Index k = 0; k < samples; ++k) {
+    const double t = dt * static_cast<double>(k);
+    gauge[k] = 10 * std::exp(-damping * omega * t) * std::cos(omega * std::sqrt(1 - damping * damping) * t) + 0.15 * std::sin(2 * std::numbers::pi * line * t) + noise[k];
+  }
+  run.channels.push_back({"gauge", "N", "N", 1, gauge});
+  FitProblem problem;
+  problem.rig = rig;
+  problem.runs = {run};
+  const std::vector<MissingForce> forces = missing_forces(fit_baseline(problem).arrival.joint);
+  ASSERT_EQ(forces.size(), 1u);
+  const double swing = std::sqrt((gauge.array() - gauge.mean()).square().mean());
+  EXPECT_NEAR(forces[0].as_read / swing, 1, 0.02) << "this gauge reads a steady force as it is";
+  EXPECT_GT(forces[0].rms(), swing);
+  EXPECT_TRUE(forces[0].out_of_proportion());
 }
 
 }  // namespace
