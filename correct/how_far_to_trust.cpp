@@ -6,6 +6,8 @@
 
 #include <fmt/format.h>
 
+#include "fit/explained.h"
+
 namespace unrig {
 namespace {
 
@@ -30,6 +32,11 @@ std::string HowFarToTrust::cells() const {
   std::string text = std::isnan(reduced_chi2) ? std::string() : fmt::format(",{:.4g}", reduced_chi2);
   for (std::size_t i = 0; i < warnings.size(); ++i) text += ",1";
   return no_answer.empty() ? text : text + ",1";
+}
+
+bool HowFarToTrust::misses_something(Eigen::Index samples) const {
+  constexpr Eigen::Index channels = 2;
+  return reduced_chi2 > most_of_noise(channels * samples);
 }
 
 HowFarToTrust HowFarToTrust::of_table(const CsvTable& table) {
