@@ -5,11 +5,14 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <filesystem>
+#include <limits>
 #include <map>
 #include <optional>
 #include <utility>
 
+#include "core/bad_readings.h"
 #include "core/csv_table.h"
 #include "core/run_limits.h"
 #include "core/text_file.h"
@@ -19,6 +22,9 @@
 #include "core/units.h"
 
 namespace unrig {
+
+using Eigen::VectorXd;
+
 namespace {
 
 constexpr std::array kinds = {std::pair{RunKind::step, "step"}, std::pair{RunKind::pluck, "pluck"}, std::pair{RunKind::forced, "forced"},
@@ -257,8 +263,81 @@ void take_times(const TimeGrid& grid, const UnitScale& seconds, Run& run) {
   }
 }
 
-Channel make_channel(CsvColumn& column, const ColumnScale& to, const TimeGrid& grid) {
-  Channel channel{column.name, column.unit, to.unit, to.scale.factor, std::move(column.value), column.missing};
+// ---------------------------------------------------------------------------------------------------------------- bad readings
+
+/// How many readings of a column are left out.
+struct LeftOut {
+  std::size_t isolated = 0, clipped = 0;
+};
+
+bool is_input(std::string_view name) { return name == "force" || name.starts_with("mount_"); }
+
+void leave_out(CsvColumn& column, const std::vector<Eigen::Index>& samples) {
+  for (const Eigen::Index k : samples) column.value[k] = std::numeric_limits<double>::quiet_NaN();
+}
+
+/// What is said of bad readings: which column, how many of them, when the first.
+class BadReadings {
+ public:
+  BadReadings(CsvTable& table, const VectorXd& seconds, Run& run) : table_(table), seconds_(seconds), run_(run) {}
+
+  /// By the column's place in the table.
+  std::vector<LeftOut> leave_out_all() {
+    std::vector<LeftOut> counts(table_.columns.size());
+    std::vector<Eigen::Index> blows;
+    for (const bool inputs : {true, false})  // what answers to a blow is judged knowing it
+      for (std::size_t c = 0; c < counts.size(); ++c) {
+        CsvColumn& column = table_.columns[c];
+        if (column.name == "time" || column.name == "weight" || !column.text.empty() || is_input(column.name) != inputs) continue;
+        leave_out_no_readings(column);
+        if (column.name == "alpha") continue;  // its spikes are found where it is known when the shaft moves (core/motion.h)
+        counts[c] = judge(column, inputs, blows);
+      }
+    return counts;
+  }
+
+ private:
+  void leave_out_no_readings(CsvColumn& column) {
+    std::vector<Eigen::Index> none;
+    for (Eigen::Index k = 0; k < column.value.size(); ++k)
+      if (std::abs(column.value[k]) >= no_reading) none.push_back(k);
+    if (none.empty()) return;
+    leave_out(column, none);
+    column.missing += none.size();
+    if (known(column.name) && column.missing == static_cast<std::size_t>(table_.rows()))
+      throw InputError(table_.place(none.front()), fmt::format("the column \"{}\" holds nothing but numbers of {:g} and more, which no reading has", column.name, no_reading), "wanted measured values", "");
+    tell(column, none, fmt::format("number(s) beyond {:g}, which instruments send where they have no reading", no_reading), "They count as missing.");
+  }
+
+  LeftOut judge(CsvColumn& column, bool input, std::vector<Eigen::Index>& blows) {
+    SuspectReadings suspect = isolated_readings(column.value, input ? ReadingOf::input : ReadingOf::answer, blows);
+    if (!suspect.isolated.empty()) tell(column, suspect.isolated, "isolated reading(s) far from their neighbours", "They are left out.");
+    leave_out(column, suspect.isolated);
+    blows.insert(blows.end(), suspect.blows.begin(), suspect.blows.end());
+    const std::vector<Eigen::Index> clipped = clipped_readings(column.value);
+    if (clipped.empty()) return {suspect.isolated.size(), 0};
+    const std::string what = fmt::format("reading(s) at the end of its range, {:g} {}, which cuts the signal off", column.value[clipped.front()], column.unit);
+    if (input) {
+      tell(column, clipped, what, "What drove the rig there is not known, and the answer is off by it. Lower the gain of the amplifier, and record again.");
+      return {suspect.isolated.size(), 0};
+    }
+    tell(column, clipped, what, "They are left out, and errors are wider for it. Lower the gain of the amplifier.");
+    leave_out(column, clipped);
+    return {suspect.isolated.size(), clipped.size()};
+  }
+
+  void tell(const CsvColumn& column, const std::vector<Eigen::Index>& samples, const std::string& what, const std::string& so) {
+    run_.warnings.push_back(fmt::format("{}:{}: the column \"{}\" holds {} {} (the first at {:.6g} s). {}", run_.file, table_.place(samples.front()).line, column.name, samples.size(), what,
+                                        seconds_[samples.front()], so));
+  }
+
+  CsvTable& table_;
+  const VectorXd& seconds_;
+  Run& run_;
+};
+
+Channel make_channel(CsvColumn& column, const ColumnScale& to, const TimeGrid& grid, const LeftOut& left_out) {
+  Channel channel{column.name, column.unit, to.unit, to.scale.factor, std::move(column.value), column.missing, left_out.clipped, left_out.isolated};
   if (!grid.rows.empty()) channel.value = Eigen::VectorXd(channel.value(grid.rows));
   if (grid.resample) channel.value = column.name == "weight" ? interpolated_weight(channel.value, grid) : interpolated(channel.value, grid);
   channel.value = (channel.value.array() * to.scale.factor + to.scale.offset).matrix();
@@ -274,6 +353,8 @@ void take_columns(CsvTable& table, const Calibrations& calibrations, Run& run) {
   take_times(grid, seconds, run);
   check_step(table, run.dt);
   std::map<std::string, ColumnScale> scales;  // of columns without a meaning, by their unit: there may be 100 000 of them
+  const VectorXd stamps = (time->value.array() * seconds.factor + seconds.offset).matrix();
+  const std::vector<LeftOut> left_out = BadReadings(table, stamps, run).leave_out_all();
   for (CsvColumn& column : table.columns) {
     if (column.name == "time") continue;
     if (!column.text.empty()) {
@@ -292,7 +373,7 @@ void take_columns(CsvTable& table, const Calibrations& calibrations, Run& run) {
       run.warnings.push_back(fmt::format("{} It is left out.", error.what()));
       continue;
     }
-    run.channels.push_back(make_channel(column, scale, grid));
+    run.channels.push_back(make_channel(column, scale, grid, left_out[static_cast<std::size_t>(&column - table.columns.data())]));
   }
   if (run.channels.empty()) {
     throw InputError({table.file, table.header_line}, "no column but \"time\" holds numbers", "wanted a measured column", "");

@@ -10,10 +10,16 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-/// Every missing sample replaced by the last value before it.
+/// Missing samples on the straight line between their neighbours; at the ends, the nearest value.
 VectorXd filled(VectorXd x) {
-  double last = 0;
-  for (double& value : x) last = std::isfinite(value) ? value : last, value = last;
+  Index before = -1;
+  for (Index k = 0; k <= x.size(); ++k) {
+    const bool there = k < x.size() && std::isfinite(x[k]);
+    if (k < x.size() && !there) continue;
+    const double left = before >= 0 ? x[before] : there ? x[k] : 0, right = there ? x[k] : left;
+    for (Index i = before + 1; i < k; ++i) x[i] = left + (right - left) * static_cast<double>(i - before) / static_cast<double>(k - before);
+    before = k;
+  }
   return x;
 }
 
@@ -49,7 +55,7 @@ MatrixXd run_inputs(const Run& run, const Conditions& conditions) {
   MatrixXd input(n + 1, (conditions.force ? 1 : 0) + (conditions.mount ? 2 : 0));
   Index column = 0;
   if (conditions.force) {
-    input.col(column).head(n) = run.channel("force").value.unaryExpr([](double f) { return std::isfinite(f) ? f : 0.0; });
+    input.col(column).head(n) = filled(run.channel("force").value);
     ++column;
   }
   if (conditions.mount) input.middleCols(column, 2).topRows(n) = mount_inputs(run);

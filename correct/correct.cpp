@@ -18,11 +18,14 @@
 #include "core/run_limits.h"
 #include "correct/how_far_to_trust.h"
 #include "correct/knots.h"
+#include "correct/misfit.h"
 #include "correct/prior.h"
 #include "correct/restless_correction.h"
 #include "correct/run_in_legs.h"
 #include "correct/uncertainty_budget.h"
+#include "fit/explained.h"
 #include "fit/run_residual.h"
+#include "fit/share_followed.h"
 
 namespace unrig {
 namespace {
@@ -151,6 +154,16 @@ RigidLoad load_at(const RunResidual& residual, const VectorXd& theta, const Vect
   return load;
 }
 
+/// By how much more than noise what a run is left with moves its circulatory load; 1 at least, and where it has no number.
+double moved_beyond_noise(const RunResidual& residual, const RunResidual::Evaluation& e, const Prior& prior, const VectorXd& theta, double reduced_chi2) {
+  if (!std::isfinite(reduced_chi2)) return 1;
+  const RigidLoad load = load_at(residual, theta, e.linear, chosen_samples(residual.motion()), {});
+  MatrixXd by_theta = load.circulatory_by_theta + load.circulatory_by_motion * e.linear_slope.topRows(load.circulatory_by_motion.cols());
+  by_theta.rowwise() += steady_per_reading(residual.model().rig()) * e.linear_slope.row(residual.first_offset());
+  const double moved = misfit_over_noise(residual.sensitivity(theta), theta_root(e, prior), by_theta, reduced_chi2);
+  return moved > 1 ? moved : 1;
+}
+
 /// Where the rigid rig goes on from behind a leg, with its motion following theta.
 RigidLoad::State going_on(const RigidLoad& load, const MatrixXd& linear_slope) {
   MatrixXd by_theta = load.behind.by_motion * linear_slope.topRows(load.behind.by_motion.cols());
@@ -275,11 +288,53 @@ std::string too_short_for_a_limit(const Run& run, double semichords) {
                      run.file, semichords, shortest_response);
 }
 
-void look_at_what_is_left(const Run& run, CorrectResult& result) {
-  if (!(result.reduced_chi2 <= HowFarToTrust::explained))  // nor where it is not a number
-    result.warnings.push_back(fmt::format("{}: gauge and angle are explained to a reduced chi-square of {:.3g} only. Something is missing from the rig of the fit, or it is another rig's: `unrig diagnose` looks "
-                                          "for it. The band is widened as if what is left were noise.",
+/// Samples behind the onset.
+Index first_behind_onset(const CorrectResult& result) { return std::clamp<Index>(static_cast<Index>((result.onset - result.start) / result.dt), 0, result.gauge.size() - 1); }
+
+/// Share of the gauge's variance that the model follows.
+double gauge_followed(const Run& run, const CorrectResult& result) {
+  const Channel* weight = run.find("weight");
+  VectorXd counts(result.gauge.size());
+  for (Index k = 0; k < counts.size(); ++k) counts[k] = std::isfinite(result.gauge[k]) && (!weight || weight->value[k] > 0) ? 1 : 0;
+  return share_followed(result.gauge, result.gauge - result.unexplained, counts);
+}
+
+/// 95 % band of the circulatory load over what that changes by, r.m.s. behind the onset.
+double band_over_change(const CorrectResult& result) {
+  const CorrectedLoad& load = result.circulatory;
+  const Index first = first_behind_onset(result), count = load.value.size() - first;
+  constexpr double usual = 1.96;
+  return usual * load.std.tail(count).norm() / (load.value.tail(count).array() - load.value[0]).matrix().norm();
+}
+
+/// Why load and response say nothing; empty where they do.
+std::string nothing_said(const Run& run, bool explained, const CorrectResult& result) {
+  constexpr double half = 0.5, clearly = 3;  // of the variance; standard deviations
+  if (!std::isfinite(result.reduced_chi2) || !result.circulatory.std.allFinite())
+    return fmt::format("{}: with the rig of the fit the model has no finite answer to this motion. It is not this rig's fit, or a parameter of it is absurd.", run.file);
+  if (const double followed = gauge_followed(run, result); followed < half && (!explained || !(std::abs(result.slope) > clearly * result.slope_std)))
+    return fmt::format("{}: the model follows {:.0f} % of the gauge's variance. The gauge does not answer to the motion of the shaft, or the rig of the fit is another one. Look at the recording.", run.file,
+                       100 * std::max(0.0, followed));
+  if (const double band = band_over_change(result); !explained && !(band < 1))
+    return fmt::format("{}: what is left of gauge and angle (reduced chi-square {:.3g}) may move the load by {:.2g} times of what it changes by. Look at the recording, or ask `unrig diagnose` what the rig lacks.", run.file,
+                       result.reduced_chi2, band);
+  return "";
+}
+
+/// `widened`: by how much more than as noise what is left widens the band.
+void look_at_what_is_left(const Run& run, Index degrees_of_freedom, double widened, CorrectResult& result) {
+  const bool explained = result.reduced_chi2 <= most_of_noise(degrees_of_freedom);
+  if (result.reduced_chi2 < least_of_noise(degrees_of_freedom))
+    result.warnings.push_back(fmt::format("{}: gauge and angle are explained to a reduced chi-square of {:.3g}, better than their noise allows. A converter is coarser than the noise, or wrong readings have raised that: look "
+                                          "at the recording.",
                                           run.file, result.reduced_chi2));
+  if (!explained) {  // nor where it is not a number
+    const std::string wider = widened > 1 ? fmt::format("It goes on for longer than a sample and moves the load by {:.2g} times what noise of its size would. The band is as much wider.", widened) : "The band is widened as if what is left were noise.";
+    result.warnings.push_back(fmt::format("{}: gauge and angle are explained to a reduced chi-square of {:.3g} only. Something is missing from the rig of the fit, or it is another rig's: `unrig diagnose` looks "
+                                          "for it. {}",
+                                          run.file, result.reduced_chi2, wider));
+  }
+  if (result.no_answer.empty()) result.no_answer = nothing_said(run, explained, result);
 }
 
 /// Knots so far apart that what a nonlinear force does to a long motion is hardly in the load; the acceleration of an oscillation is off by (omega h)^2 / 12.
@@ -353,7 +408,7 @@ CorrectResult correct(const CorrectProblem& problem) {
   const std::vector<Windows> windows_by_leg = legs_to_follow(model, run, start, windows, result.warnings);
   if (windows_by_leg.empty()) {
     correct_restless({model, run, prior, start, length, steady_per_reading(problem.rig), problem.imposed}, result);
-    look_at_what_is_left(run, result);
+    look_at_what_is_left(run, 2 * run.samples(), 1, result);
     return result;
   }
 
@@ -369,12 +424,14 @@ CorrectResult correct(const CorrectProblem& problem) {
     together = legs.look_at(search.solution, search.prior, result.calibration_uncertainty > 0);
     result.reduced_chi2 = together.all.chi2 / static_cast<double>(legs.degrees_of_freedom() - static_cast<Index>(search.prior.free.size()));
   };
-  const auto budget_of = [&](std::size_t leg, const Prior& by, double calibration) { return legs.budget(leg, together, by, calibration, std::sqrt(std::max(1.0, result.reduced_chi2))); };
+  double beyond_noise = 1;
+  const auto budget_of = [&](std::size_t leg, const Prior& by, double calibration) { return legs.budget(leg, together, by, calibration, beyond_noise * std::sqrt(std::max(1.0, result.reduced_chi2))); };
   if (problem.imposed.any()) {
     look_at(free);
     result.indicial = indicial_response(model, free.solution.theta, budget_of(0, free.prior, result.calibration_uncertainty), length, result.semichords_per_second);
   }
   look_at(best);
+  if (legs.size() == 1 && result.reduced_chi2 > most_of_noise(legs.degrees_of_freedom())) beyond_noise = moved_beyond_noise(legs.residual(0), together.all, best.prior, theta, result.reduced_chi2);
   const UncertaintyBudget of_theta = budget_of(0, best.prior, result.calibration_uncertainty);
   const std::vector<RunResidual::Evaluation>& by_leg = legs.by_leg(best.solution);
 
@@ -395,7 +452,7 @@ CorrectResult correct(const CorrectProblem& problem) {
   result.determined = best.determined;
   result.amplitudes = static_cast<Index>(best.prior.amplitudes.size());
   result.in_fit = !best.prior.held.empty();
-  look_at_what_is_left(run, result);
+  look_at_what_is_left(run, legs.degrees_of_freedom(), beyond_noise, result);
   return result;
 }
 

@@ -6,6 +6,8 @@
 
 #include <fmt/format.h>
 
+#include "fit/explained.h"
+
 namespace unrig {
 namespace {
 
@@ -33,6 +35,11 @@ std::string HowFarToTrust::cells() const {
   for (std::size_t i = 0; i < warnings.size(); ++i) text += ",1";
   if (!no_answer.empty()) text += ",1";
   return made_by.column().empty() ? text : text + ",1";
+}
+
+bool HowFarToTrust::misses_something(Eigen::Index samples) const {
+  constexpr Eigen::Index channels = 2;
+  return reduced_chi2 > most_of_noise(channels * samples);
 }
 
 HowFarToTrust HowFarToTrust::of_table(const CsvTable& table) {

@@ -1,4 +1,5 @@
 #pragma once
+#include <Eigen/Core>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -22,8 +23,8 @@ struct HowFarToTrust {
   /// Out of a table that `unrig correct` wrote: NaN and nothing where the columns are absent.
   static HowFarToTrust of_table(const CsvTable& table);
 
-  /// Gauge and angle are explained no better than this where something is missing from the model.
-  static constexpr double explained = 1.5;
+  /// Whether more is left of gauge and angle, of so many samples, than their noise (fit/explained.h).
+  bool misses_something(Eigen::Index samples) const;
 };
 
 }  // namespace unrig

@@ -12,6 +12,7 @@
 #include "core/fingerprint.h"
 #include "core/gauge_lever.h"
 #include "fit/coloured_noise.h"
+#include "fit/explained.h"
 #include "fit/share_followed.h"
 
 namespace unrig {
@@ -97,7 +98,7 @@ std::string too_few_samples(Index observations, Index variables) {
   return fmt::format("{} samples leave {} degrees of freedom beside {} unknowns, too few to tell noise from signal. Record for several periods of the lowest mode.", observations, freedom, variables);
 }
 
-bool FittedRun::explained() const { return reduced_chi2() < 1.2 + 5 * std::sqrt(2 / static_cast<double>(degrees_of_freedom)); }
+bool FittedRun::explained() const { return reduced_chi2() < most_of_noise(degrees_of_freedom); }
 
 FittedRun describe_run(const RunResidual& residual, const VectorXd& theta, double chi2) {
   const Run& run = residual.run();
@@ -116,6 +117,8 @@ FittedRun describe_run(const RunResidual& residual, const VectorXd& theta, doubl
     c.name = name;
     c.unit = channel.unit;
     c.missing = channel.missing;
+    c.bad = channel.bad;
+    c.clipped = channel.clipped;
     c.samples = (weight.array() > 0).count();
     c.rms_residual = rms(channel.value - model, weight);
     c.noise = noise;
@@ -253,6 +256,20 @@ void warn_of_silent_runs(const JointProblem& joint, FitResult& result) {
   }
 }
 
+namespace {
+
+/// A residual of nothing but rounding is that of a simulation, whose noise is a convention (run_residual.cpp).
+void warn_of_too_little(const FittedRun& run, FitResult& result) {
+  constexpr double clearly = 1.2, rounding = 0.01;
+  for (const FittedChannel& c : run.channels)
+    if (c.noise > clearly * c.rms_residual && c.rms_residual > rounding * c.noise)
+      result.warnings.push_back(fmt::format("{}: less is left of {} ({:.3g} {}) than its noise ({:.3g} {}; reduced chi-square {:.2f}). Its converter is coarser than the noise, or wrong readings have raised that: look at the "
+                                            "recording. The run counts for less than it could.",
+                                            run.file, c.name, c.rms_residual, c.unit, c.noise, c.unit, run.reduced_chi2()));
+}
+
+}  // namespace
+
 void warn_of_mismatch(FitResult& result) {
   for (const FittedRun& run : result.runs) {
     if (run.aside) {
@@ -260,6 +277,7 @@ void warn_of_mismatch(FitResult& result) {
                                             run.file, run.reduced_chi2()));
       continue;
     }
+    if (run.reduced_chi2() < least_of_noise(run.degrees_of_freedom)) warn_of_too_little(run, result);
     if (run.explained()) continue;
     std::string which;
     for (const FittedChannel& c : run.channels)

@@ -88,7 +88,7 @@ std::string to_json(const FitResult& r) {
   if (r.law_steps > 1) out["law_steps"] = r.law_steps;
   out["parameters"] = json::array();
   for (const FittedParameter& p : r.parameters) {
-    json item = {{"name", p.name},   {"value", number(p.value)}, {"std_error", number(p.std_error)},
+    json item = {{"name", p.name},   {"value", number(p.value)}, {"std_error", p.std_error > 0 ? number(p.std_error) : json(nullptr)},
                  {"unit", p.unit},   {"identified", p.identified}, {"start", number(p.start)}};
     if (std::isfinite(p.std_error) && p.std_error_white > 0) {
       item["std_error_white"] = number(p.std_error_white);
@@ -119,7 +119,7 @@ std::string to_json(const FitResult& r) {
   for (const FittedRun& run : r.runs) {
     json channels = json::array();
     for (const FittedChannel& c : run.channels)
-      channels.push_back({{"name", c.name}, {"unit", c.unit}, {"samples", c.samples}, {"missing", c.missing}, {"spikes", c.spikes},
+      channels.push_back({{"name", c.name}, {"unit", c.unit}, {"samples", c.samples}, {"missing", c.missing}, {"spikes", c.spikes + static_cast<Eigen::Index>(c.bad)}, {"clipped", c.clipped},
                           {"rms_residual", number(c.rms_residual)}, {"noise", number(c.noise)}});
     const FittedChannel& first = run.channels.front();
     out["runs"].push_back({{"file", run.file}, {"fingerprint", run.fingerprint}, {"onset_angle", number(run.onset_angle)}, {"samples", run.samples}, {"rms_residual", number(first.rms_residual)}, {"noise", number(first.noise)},
@@ -169,6 +169,7 @@ FittedRig read_fit(const json& in, const std::string& path) {
       p.run = item.value("run", "");
       p.value = item.at("value").get<double>();
       p.std_error = item.at("std_error").is_number() ? item.at("std_error").get<double>() : std::nan("");
+      if (p.std_error <= 0) throw refuse(fmt::format("the standard error of {} is {:g}, where one is above zero or null", p.name, p.std_error));
       p.identified = item.value("identified", true);
       fit.parameters.push_back(p);
     }
@@ -178,7 +179,11 @@ FittedRig read_fit(const json& in, const std::string& path) {
       const json& rows = in["correlation"];
       if (rows.size() != fit.parameters.size()) throw refuse(fmt::format("{} parameters but a correlation matrix of {} rows", n, rows.size()));
       for (Eigen::Index i = 0; i < n; ++i)
-        for (Eigen::Index j = 0; j < n; ++j) fit.correlation(i, j) = rows.at(static_cast<std::size_t>(i)).at(static_cast<std::size_t>(j)).get<double>();
+        for (Eigen::Index j = 0; j < n; ++j) {
+          double& c = fit.correlation(i, j);
+          c = rows.at(static_cast<std::size_t>(i)).at(static_cast<std::size_t>(j)).get<double>();
+          if (!(std::abs(c) <= 1) || (i == j && c != 1)) throw refuse(fmt::format("a correlation of {:g} in row {}, column {}", c, i + 1, j + 1));
+        }
     }
     for (const json& run : in.value("runs", json::array())) {
       fit.runs.push_back(run.value("file", ""));
@@ -269,6 +274,8 @@ Eigen::VectorXd theta_for(const AeroelasticModel& model, const FittedRig& fit, c
     const Parameter& p = model.parameters()[j];
     double& value = theta[static_cast<Eigen::Index>(j)];
     if (const FittedParameter* fitted = fit.find(p.name, run_file)) {
+      if (!(fitted->value >= p.lower && fitted->value <= p.upper))
+        throw InputError({fit.file, 0}, fmt::format("{} is {:g}", p.name, fitted->value), fmt::format("wanted a value from {:g} to {:g}", p.lower, p.upper), "Give the file that `unrig fit -o` wrote, as it is.");
       value = fitted->value;
       continue;
     }
@@ -283,6 +290,15 @@ Eigen::VectorXd theta_for(const AeroelasticModel& model, const FittedRig& fit, c
   }
   return theta;
 }
+
+namespace {
+
+std::string left_out(const FittedChannel& c) {
+  const auto spikes = c.spikes + static_cast<Eigen::Index>(c.bad);
+  return (spikes ? fmt::format(", {} spikes left out", spikes) : "") + (c.clipped ? fmt::format(", {} clipped readings left out", c.clipped) : "");
+}
+
+}  // namespace
 
 std::string report(const FitResult& r, double least) {
   std::string text = "[[Fit Statistics]]\n";
@@ -332,7 +348,7 @@ std::string report(const FitResult& r, double least) {
     text += fmt::format("    {}: {} samples, reduced chi-square {:.3f}{}\n", base_name(run.file), run.samples, run.reduced_chi2(), run.aside ? ", set aside: no part in the fit" : "");
     for (const FittedChannel& c : run.channels)
       text += fmt::format("        {:<6} residual {:.4g} {}, noise {:.4g} {}{}{}\n", c.name, c.rms_residual, c.unit, c.noise, c.unit,
-                          c.missing ? fmt::format(", {} missing", c.missing) : "", c.spikes ? fmt::format(", {} spikes left out", c.spikes) : "");
+                          c.missing ? fmt::format(", {} missing", c.missing) : "", left_out(c));
   }
   return text;
 }

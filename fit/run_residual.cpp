@@ -3,10 +3,10 @@
 #include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
 #include <fmt/format.h>
 
+#include "core/bad_readings.h"
 #include "core/run_inputs.h"
 #include "core/run_limits.h"
 #include "fit/run_linearised.h"
@@ -19,13 +19,11 @@ using Eigen::VectorXd;
 
 namespace {
 
-/// No reading is better than its converter, nor than the digits of a simulation, about a hundred-millionth of its range.
+/// No reading is better than its converter, nor than the digits of a simulation, about a hundred-millionth of its range. A single wrong reading does not count in that.
 double least_noise(const VectorXd& value) {
-  double low = std::numeric_limits<double>::infinity(), high = -low;
-  for (const double x : value)
-    if (std::isfinite(x)) low = std::min(low, x), high = std::max(high, x);
   constexpr double digits = 1e-8;
-  return high > low ? std::max(rounding_level(value), digits * (high - low)) : 0;
+  const double range = robust_range(value);
+  return range > 0 ? std::max(rounding_level(value), digits * range) : 0;
 }
 
 /// Standard deviation of a channel's noise; 0 where the channel never changes.

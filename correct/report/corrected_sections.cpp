@@ -55,10 +55,12 @@ std::string caption_of_band(double factor) {
   return factor == 2 ? "The band is two standard deviations at each point." : fmt::format("The band, {:.2f} standard deviations, holds the whole curve with 95 %.", factor);
 }
 
+constexpr Index of_a_long_record = 1000000;  // a table of the response does not say how long its record was
+
 /// The verdict in the tone of what a reader must know first.
-void add_verdict(ReportPage& page, const HowFarToTrust& trust, Tone tone, const std::string& text, const std::string& about) {
+void add_verdict(ReportPage& page, const HowFarToTrust& trust, Index samples, Tone tone, const std::string& text, const std::string& about) {
   if (!trust.no_answer.empty()) return page.add_verdict(Tone::bad, "Not to be trusted, see below. " + text, about);
-  if (trust.reduced_chi2 > HowFarToTrust::explained)
+  if (trust.misses_something(samples))
     return page.add_verdict(Tone::bad, fmt::format("Something is missing from the rig of the fit: gauge and angle are explained to a reduced chi-square of {} only. {}", plain(trust.reduced_chi2, 3), text), about);
   if (!trust.warnings.empty()) return page.add_verdict(Tone::open, text + " See the warnings below.", about);
   page.add_verdict(tone, text, about);
@@ -84,7 +86,7 @@ void add_corrected(ReportPage& page, const std::string& text, const std::string&
 
   const HowFarToTrust trust = HowFarToTrust::of_table(table);
   const bool is_told = std::isfinite(trust.reduced_chi2) || !trust.warnings.empty() || !trust.no_answer.empty();
-  add_verdict(page, trust, is_told ? Tone::good : Tone::open,
+  add_verdict(page, trust, t.size(), is_told ? Tone::good : Tone::open,
               fmt::format("A rigid rig would have felt a circulatory load of {} {} at the end of the record, after {} {} before the motion.", with_error(circulatory.value[last], circulatory_std.value[last]),
                           load.unit, plain(circulatory.value[0], 4), load.unit),
               name);
@@ -119,7 +121,7 @@ void add_modal_load(ReportPage& page, const std::string& text, const std::string
   const auto rms = [](const VectorXd& x) { return std::sqrt(x.array().isFinite().select(x.array().square(), 0).sum() / static_cast<double>(std::max<Index>(1, x.array().isFinite().count()))); };
 
   const HowFarToTrust trust = HowFarToTrust::of_table(table);
-  add_verdict(page, trust, Tone::good,
+  add_verdict(page, trust, of_a_long_record, Tone::good,
               fmt::format("A rigid rig that does not move would have read {} {} r.m.s., give or take {}; the gauge reads {}, of which the measured inputs account for {}.", plain(rms(load.value), 4), load.unit,
                           plain(rms(load_std.value), 2), plain(rms(gauge.value), 4), plain(rms(inputs.value), 4)),
               name);
@@ -156,9 +158,9 @@ void add_indicial(ReportPage& page, const std::string& text, const std::string& 
   const std::string name = file_name(path), range = fmt::format("from {:.3g} to {:.3g} semichords", x[0], x[rows - 1]);
   const HowFarToTrust trust = HowFarToTrust::of_table(table);
   if (within == known)
-    add_verdict(page, trust, Tone::good, fmt::format("The indicial response agrees with Wagner's function, which lies within its 95 % band all the way {}.", range), name);
+    add_verdict(page, trust, of_a_long_record, Tone::good, fmt::format("The indicial response agrees with Wagner's function, which lies within its 95 % band all the way {}.", range), name);
   else
-    add_verdict(page, trust, Tone::open,
+    add_verdict(page, trust, of_a_long_record, Tone::open,
                 fmt::format("The indicial response departs from Wagner's function, which lies within its 95 % band over {:.0f} % of the points {}.", 100 * static_cast<double>(within) / static_cast<double>(known), range), name);
   page.add_section("Indicial response: " + name);
   add_warnings(page, trust);

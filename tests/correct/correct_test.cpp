@@ -199,6 +199,44 @@ TEST(Correct, SaysWhenTheRigOfTheFitDoesNotExplainTheReadings) {
   EXPECT_THAT(correct({null_rig(), null_fit(), step, 0}).warnings, testing::Contains(HasSubstr("unrig diagnose")));
 }
 
+/// What is left counts as noise: the band of the load grows with its root.
+TEST(Correct, NoiseOfTheGaugeGrowsWithWhatIsLeft) {
+  CorrectProblem problem = test::null_problem("step_a");
+  const CorrectResult clean = correct(problem);
+  for (Channel& c : problem.run.channels)
+    if (c.name == "gauge")
+      for (Index k = 0; k < c.value.size(); ++k) c.value[k] += 0.15 * std::sin(2 * 3.14159265 * 11 * 0.002 * static_cast<double>(k));  // at no frequency of the rig: what it does cancels
+  const CorrectResult wrong = correct(problem);
+  EXPECT_GT(wrong.reduced_chi2, 3);
+  EXPECT_EQ(wrong.no_answer, "");
+  const double grown = std::sqrt(wrong.reduced_chi2 / std::max(1.0, clean.reduced_chi2));
+  for (const Index k : {Index{0}, Index{1000}, Index{2500}}) {
+    const auto gauge = static_cast<Index>(Source::gauge);
+    EXPECT_GT(wrong.circulatory.by_source(k, gauge) / clean.circulatory.by_source(k, gauge), 0.8 * grown) << k;
+  }
+}
+
+/// The model has an answer to everything; these are none.
+TEST(Correct, SaysWhereThereIsNoAnswer) {
+  const auto gauge_of = [](CorrectProblem& problem) -> VectorXd& { return std::find_if(problem.run.channels.begin(), problem.run.channels.end(), [](const Channel& c) { return c.name == "gauge"; })->value; };
+  CorrectProblem noise = test::null_problem("step_a");
+  std::mt19937_64 random(1);
+  std::normal_distribution<double> normal(0, 0.03);
+  for (double& value : gauge_of(noise)) value = normal(random);
+  EXPECT_THAT(correct(noise).no_answer, HasSubstr("of the gauge's variance"));
+
+  CorrectProblem hardly_read = test::null_problem("step_a");
+  VectorXd& gauge = gauge_of(hardly_read);
+  for (Index k = 0; k < gauge.size(); ++k)
+    if (k % 100 != 0) gauge[k] = std::nan("");
+  EXPECT_THAT(refusal(hardly_read), HasSubstr("gauge")) << "no noise level without neighbours";
+
+  CorrectProblem absurd = test::null_problem("step_a");
+  for (FittedParameter& p : absurd.fit.parameters)
+    if (p.name == "normal.stiffness_scale") p.value = -1;
+  EXPECT_THAT(refusal(absurd), HasSubstr("normal.stiffness_scale is -1"));
+}
+
 TEST(Correct, SaysWhenARecordingIsNotTheOneOfTheFit) {
   unrig::Run step = read_run(test::null_campaign("step_a.csv"));
   FittedRig fit = null_fit();

@@ -247,6 +247,28 @@ double spectral_frequency(const Run& run, int method) {
   return s.spacing * (method == 2 ? peak.position : static_cast<double>(peak.line));
 }
 
+/// Two decays of the same rig in the same air: whatever shift the noise makes of them is no fluid.
+TEST(ApparentMass, AShiftThatIsNoiseIsRefused) {
+  const auto refusal = [](const ApparentMassProblem& problem) -> std::string {
+    try {
+      apparent_mass(problem);
+    } catch (const NoAnswer& error) {
+      return error.what();
+    }
+    return "";
+  };
+  for (const unsigned seed : {1u, 2u, 3u, 4u}) {
+    std::mt19937_64 random(seed);
+    const Decay decay{8, 0.01, 1, 1};
+    const ApparentMassProblem problem{modal_rig(2, 8), make_run("dry.csv", decay, dry_density, 400, 0.005, 0.01, random), make_run("wet.csv", decay, 2 * dry_density, 400, 0.005, 0.01, random), false, {}};
+    EXPECT_THAT(refusal(problem), testing::HasSubstr("the frequency shift is not significant")) << seed;
+  }
+  ApparentMassProblem shapes = problem_of("null");
+  shapes.wet.channels = shapes.dry.channels;
+  shapes.wet.density = 2 * shapes.dry.density;
+  EXPECT_THAT(refusal(shapes), testing::HasSubstr("the frequency shift is not significant"));
+}
+
 // R.m.s. errors of the added mass, in percent, measured by this test, and those of a reference computed elsewhere (ratio 1, 2 s, 40 dB):
 //
 //                          line of the FFT   padded x8   Hann + interpolation   damped least squares
