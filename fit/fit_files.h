@@ -18,6 +18,8 @@ struct FittedRig {
   Eigen::Index law_steps = 1;        ///< FitResult::law_steps
   std::vector<FittedParameter> parameters;
   Eigen::MatrixXd correlation;
+  std::vector<FittedGiven> givens;     ///< numbers that stated their uncertainty, as they came out
+  Eigen::MatrixXd joint_covariance;    ///< of `parameters`, then `givens`; empty without givens
   std::vector<std::string> runs;
   std::vector<std::string> fingerprints;  ///< of the runs (core/fingerprint.h), empty in a fit.json of an earlier version
   std::vector<double> onset_angles;  ///< rad, of the runs; not a number in a fit.json of an earlier version, empty in a fit made in code
