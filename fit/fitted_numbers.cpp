@@ -122,6 +122,15 @@ Run FittedNumbers::run(const VectorXd& off) const {
   return with_errors(*run_, off_.tail(own) + off.tail(own));
 }
 
+std::vector<Index> FittedNumbers::places_of_parameters(const AeroelasticModel& model, const std::string& run_file) const {
+  std::vector<Index> places(fit_->parameters.size(), -1);
+  for (std::size_t j = 0; j < model.parameters().size(); ++j) {
+    const Parameter& p = model.parameters()[j];
+    if (const FittedParameter* fitted = p.per_run ? nullptr : fit_->find(p.name, run_file)) places[static_cast<std::size_t>(fitted - fit_->parameters.data())] = static_cast<Index>(j);
+  }
+  return places;
+}
+
 FittedRig FittedNumbers::with_numbers_known() const {
   FittedRig known = *fit_;
   const auto count = static_cast<Index>(known.parameters.size());

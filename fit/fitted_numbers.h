@@ -31,6 +31,8 @@ class FittedNumbers {
     Eigen::VectorXd parameters;  ///< of FittedRig::parameters
   };
   const std::vector<Direction>& directions() const { return directions_; }
+  /// Where each of the fit's parameters stands among those of `model` in a run; -1: not there, or another run's.
+  std::vector<Eigen::Index> places_of_parameters(const AeroelasticModel& model, const std::string& run_file) const;
   /// The fit with the errors that its parameters have when the numbers are what they are.
   FittedRig with_numbers_known() const;
 
