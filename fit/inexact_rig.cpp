@@ -45,7 +45,9 @@ Arrival InexactRig::moved(const Arrival& from, const Step& step, double part) {
   const VectorXd there = z_ + part * step.deviations;
   auto problem = std::make_shared<FitProblem>();
   problem->rig = numbers_.rig_at(there);
-  for (std::size_t r = 0; r < stated_->runs.size(); ++r) problem->runs.push_back(numbers_.run_at(r, there));
+  const VectorXd before = std::exchange(z_, there);
+  problem->runs = runs();
+  z_ = before;
   problem->circulation = stated_->circulation;
   problem->effects = stated_->effects;
   problem->start = stated_->start;
@@ -68,11 +70,25 @@ Arrival InexactRig::moved(const Arrival& from, const Step& step, double part) {
     Unknown& u = next.joint.unknowns()[i];
     u = from.joint.unknowns()[i];
     const Parameter& p = next.joint.parameter(u);
-    u.value = std::clamp(u.value + part * step.unknowns[static_cast<Index>(i)], p.lower, p.upper);
+    const double held_off = u.held ? p.start - from.joint.parameter(u).start : 0;  // what is held at the rig file's number goes with it
+    u.value = std::clamp(u.value + held_off + part * step.unknowns[static_cast<Index>(i)], p.lower, p.upper);
   }
   z_ = there;
   earlier_.push_back(std::exchange(problem_, std::move(problem)));
   return next;
+}
+
+std::vector<Run> InexactRig::runs() const {
+  std::vector<Run> runs;
+  for (std::size_t r = 0; r < stated_->runs.size(); ++r) runs.push_back(numbers_.run_at(r, z_));
+  return runs;
+}
+
+std::vector<FittedGiven> InexactRig::numbers() const {
+  std::vector<FittedGiven> numbers = numbers_.numbers();
+  const VectorXd off = numbers_.spread() * z_;
+  for (std::size_t i = 0; i < numbers.size(); ++i) numbers[i].value += off[static_cast<Index>(i)];
+  return numbers;
 }
 
 void InexactRig::search(Arrival& arrival) {
@@ -115,11 +131,10 @@ void InexactRig::describe(const JointProblem& joint, const InexactUncertainty& u
   const MatrixXd& spread = numbers_.spread();
   const MatrixXd of_numbers = spread * uncertainty.of_deviations * spread.transpose();
   const VectorXd off = spread * z_;
-  result.givens = numbers_.numbers();
+  result.givens = numbers();
   for (std::size_t i = 0; i < result.givens.size(); ++i) {
     FittedGiven& given = result.givens[i];
     const auto row = static_cast<Index>(i);
-    given.value = given.stated + off[row];
     given.std_error = std::sqrt(of_numbers(row, row));
     constexpr double far = 3;
     const double shift = off[row] / given.stated_std;

@@ -25,9 +25,10 @@ class InexactRig {
   /// From a fit at the present numbers (at first the stated ones) to the best of both. The runs of `arrival` are this object's from then on.
   void search(Arrival& arrival);
 
-  /// Rig and runs at the present numbers.
-  const FitProblem& problem() const { return *problem_; }
-  const Eigen::VectorXd& deviations() const { return z_; }
+  /// Rig, runs and numbers as they stand at the end of a search; errors of the numbers as stated.
+  Rig rig() const { return numbers_.rig_at(z_); }
+  std::vector<Run> runs() const;
+  std::vector<FittedGiven> numbers() const;
 
   /// Covariance of the unknowns, numbers included, at the end of a search.
   InexactUncertainty uncertainty(const Arrival& arrival) const { return inexact_uncertainty(arrival.joint, &*slopes_); }

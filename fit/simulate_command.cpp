@@ -17,6 +17,7 @@
 #include "core/text_file.h"
 #include "core/units.h"
 #include "fit/fit_files.h"
+#include "fit/fitted_numbers.h"
 #include "fit/shaft_motion.h"
 #include "fit/simulated_run.h"
 
@@ -99,7 +100,7 @@ void take_out_noise_of_the_angle(const Rig& rig, Run& run) {
 }
 
 SimulateProblem problem_of(const Options& options) {
-  const Rig rig = read_rig(options.rig);
+  Rig rig = read_rig(options.rig);
   for (const std::string& warning : rig.warnings) warn(warning);
   Run run = read_run(options.run);
   for (const std::string& warning : run.warnings) warn(warning);
@@ -109,6 +110,14 @@ SimulateProblem problem_of(const Options& options) {
     warn(fmt::format("{}: other readings or conditions than those that {} was fitted to; it is simulated with the slope and the steady load of the fitted ones all the same. Fit again, or give the new recording "
                      "another name.",
                      run.file, fit->file));
+  if (fit && !fit->givens.empty()) {
+    const FittedNumbers numbers(*fit, rig, run);
+    const Rig fitted_rig = numbers.rig();
+    const Run fitted_run = numbers.run();
+    rig = fitted_rig;
+    run = fitted_run;
+    warn(fmt::format("{}: simulated with the numbers of rig and run as the fit adjusted them; one curve, without a band for what they leave uncertain", options.fit));
+  }
   if (!options.as_recorded && !options.jumps) take_out_noise_of_the_angle(rig, run);
 
   std::optional<TabulatedIndicial> table;

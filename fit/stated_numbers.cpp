@@ -73,7 +73,10 @@ Moved moved_run(const Arrival& at, const StatedNumbers& numbers, const VectorXd&
   residual.keep_noise_of(now);
   residual.follow_in(now.finer());
   residual.start_from(now);
-  return look_at(residual, at.joint.theta(r), gain);
+  VectorXd theta = at.joint.theta(r);
+  for (const Unknown& u : at.joint.unknowns())  // what is held at the rig file's number goes with it
+    if (u.held) theta[u.parameter] += model.parameters()[static_cast<std::size_t>(u.parameter)].start - at.joint.parameter(u).start;
+  return look_at(residual, theta, gain);
 }
 
 }  // namespace
