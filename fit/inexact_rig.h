@@ -16,7 +16,7 @@ namespace unrig {
 ///   chi-square(theta, g) + sum over numbers ((g - stated) / std)^2,
 ///
 /// the numbers by way of their independent deviations z (fit/stated_numbers.h). Gauss-Newton steps in both, the rig made anew at each g and theta fitted to it, until the next step is shorter
-/// than 0.05 of its own standard deviations. Slopes over z are taken anew where z has moved by more than one standard deviation.
+/// than 0.05 of its own standard deviations.
 class InexactRig {
  public:
   /// `stated` must outlive this.
@@ -46,7 +46,7 @@ class InexactRig {
 
   const FitProblem* stated_;
   StatedNumbers numbers_;
-  Eigen::VectorXd z_, slopes_at_;
+  Eigen::VectorXd z_;
   std::shared_ptr<const FitProblem> problem_;
   std::vector<std::shared_ptr<const FitProblem>> earlier_;  ///< whose runs arrivals that were compared may still look at
   std::optional<NumberSlopes> slopes_;

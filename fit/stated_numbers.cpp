@@ -156,7 +156,7 @@ bool StatedNumbers::acts(std::size_t run, Index deviation) const {
   return stated.givens && !spread_.block(first_number_[run], deviation, static_cast<Index>(stated.givens->numbers.size()), 1).isZero(0);
 }
 
-NumberSlopes number_slopes(const Arrival& at, const StatedNumbers& numbers, const VectorXd& z, const NumberSlopes* known) {
+NumberSlopes number_slopes(const Arrival& at, const StatedNumbers& numbers, const VectorXd& z) {
   const std::vector<RunResidual>& runs = at.joint.runs();
   const auto parameters = static_cast<Index>(at.model->parameters().size()), deviations = numbers.deviations();
   NumberSlopes slopes{std::vector<RunResidual::Sensitivity>(runs.size()), MatrixXd::Zero(static_cast<Index>(runs.size()), deviations)};
@@ -166,17 +166,12 @@ NumberSlopes number_slopes(const Arrival& at, const StatedNumbers& numbers, cons
     slopes.runs[r] = runs[r].sensitivity(theta);
     step[r] = step_of(runs[r], theta);
     unit[r] = reading_of_steady_load(runs[r]);
-    for (std::size_t c = 0; c < slopes.runs[r].channels.size(); ++c) {
-      auto& slope = slopes.runs[r].channels[c].slope;
+    for (RunResidual::Sensitivity::PerChannel& channel : slopes.runs[r].channels) {
+      MatrixXd& slope = channel.slope;
       slope.conservativeResize(Eigen::NoChange, parameters + deviations);
-      if (known) slope.rightCols(deviations) = known->runs[r].channels[c].slope.rightCols(deviations);
-      else slope.rightCols(deviations).setZero();
+      slope.rightCols(deviations).setZero();
     }
   });
-  if (known) {
-    slopes.offset = known->offset;
-    return slopes;
-  }
   in_parallel(static_cast<std::size_t>(deviations), [&](std::size_t k) {
     const auto deviation = static_cast<Index>(k);
     for (std::size_t r = 0; r < runs.size(); ++r) {

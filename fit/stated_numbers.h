@@ -51,8 +51,7 @@ struct NumberSlopes {
   Eigen::MatrixXd offset;                      ///< runs x deviations: d offset of the first channel, as if its conversion into a load stayed what it is
 };
 
-/// At the present values of the fit and at z, by central differences of the rig and of the runs: each is one evaluation of the runs without derivatives. `known`: slopes over the
-/// deviations that are still good enough; only those over the parameters are taken anew.
-NumberSlopes number_slopes(const Arrival& at, const StatedNumbers& numbers, const Eigen::VectorXd& z, const NumberSlopes* known = nullptr);
+/// At the present values of the fit and at z, by central differences of the rig and of the runs: each is one evaluation of the runs without derivatives.
+NumberSlopes number_slopes(const Arrival& at, const StatedNumbers& numbers, const Eigen::VectorXd& z);
 
 }  // namespace unrig
