@@ -114,7 +114,7 @@ TEST(StatedErrors, NoRigHasAMassBelowZero) {
 }
 
 TEST(StatedErrors, OfARunsHead) {
-  const Run run = parse_run(run_text("# calibration = \"4.4 N/V\"\n# calibration_std = \"0.044 N/V\"\n# speed_std_percent = 0.5\n# speed_error = \"own\"\n# density_std = \"1 kg/m^3\"\n# clock_std_percent = 0.1\n", "gauge [V]"), "step.csv");
+  const unrig::Run run = parse_run(run_text("# calibration = \"4.4 N/V\"\n# calibration_std = \"0.044 N/V\"\n# speed_std_percent = 0.5\n# speed_error = \"own\"\n# density_std = \"1 kg/m^3\"\n# clock_std_percent = 0.1\n", "gauge [V]"), "step.csv");
   ASSERT_NE(run.givens, nullptr);
   const Givens& g = *run.givens;
   EXPECT_NEAR(number(g, "speed").std, 0.0025, 1e-15);
@@ -126,7 +126,7 @@ TEST(StatedErrors, OfARunsHead) {
   VectorXd off = VectorXd::Zero(4);
   off[&number(g, "calibration") - g.numbers.data()] = 0.44;
   off[&number(g, "clock") - g.numbers.data()] = 0.01;
-  const Run moved = with_errors(run, off);
+  const unrig::Run moved = with_errors(run, off);
   EXPECT_NEAR(moved.channel("gauge").value[2], 1.1 * run.channel("gauge").value[2], 1e-12);
   EXPECT_NEAR(moved.dt, 1.01 * run.dt, 1e-15);
 }

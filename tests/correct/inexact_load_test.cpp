@@ -33,7 +33,7 @@ Corrected correct_campaign(const std::string& folder, const std::string& step, c
   const FittedRig fitted = read_fit(directory.file("fit.json", to_json(fit(problem))));
   const std::string path = folder + "/" + step + ".csv";
   CorrectProblem at{problem.rig, fitted, of_runs.empty() ? read_run(path) : test::run_that_states(path, of_runs), 0};
-  return {correct(at), read_run(path).find("gauge") ? test::csv_column(folder + "/truth_" + step + ".csv", "circulatory") : VectorXd()};
+  return {correct(at), test::column_of(folder + "/truth_" + step + ".csv", "circulatory")};
 }
 
 struct Held {

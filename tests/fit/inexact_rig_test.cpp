@@ -68,7 +68,7 @@ TEST(NumberSlopes, AreTheSlopesOfTheResidual) {
   const MatrixXd slope = -slopes.runs.front().channels.front().slope.rightCols(19);
   const auto residual = [&](const VectorXd& z) -> VectorXd {
     const Rig rig = numbers.rig_at(z);
-    const Run moved = numbers.run_at(0, z);
+    const unrig::Run moved = numbers.run_at(0, z);
     const AeroelasticModel there(rig, make_basis(rig, model->basis().normal_modes, model->basis().torsion_modes), model->circulation());
     RunResidual other(there, moved, {});
     other.keep_noise_of(run);
@@ -150,7 +150,7 @@ TEST(InexactRig, ErrorsCoverMassesThatAreOffByWhatIsStated) {
 TEST(InexactRig, ACalibrationIsAsUncertainAsTheSlopesAreAndLeavesTheRigAlone) {
   const FitResult exact = fit(null_problem(five_runs));
   FitProblem problem = null_problem(five_runs);
-  for (Run& run : problem.runs) run.givens = one_per_cent_of_the_calibration();
+  for (unrig::Run& run : problem.runs) run.givens = one_per_cent_of_the_calibration();
   const FitResult result = fit(problem);
   const FittedParameter &slope = parameter(result, "normal_force_slope", "step_b"), &kn = parameter(result, "normal.stiffness_scale");
   EXPECT_NEAR(slope.std_error / slope.value, 0.01, 1e-3);
