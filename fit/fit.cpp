@@ -127,6 +127,10 @@ FitResult describe_fit(Arrival& arrival, const FitProblem& problem, Settle first
   }
   describe_parameters(joint, uncertainty, problem.start, result);
   if (inexact) inexact->describe(joint, with_numbers, result);
+  if (inexact && !problem.profile.empty()) {
+    result.warnings.push_back("profiles are those with the numbers of rig file and runs known; the standard errors allow for what they state");
+    uncertainty = estimate_uncertainty(joint);
+  }
   describe_profiles(joint, uncertainty, problem, result);
   judge_answer(result);
   warn_of_mismatch(result);

@@ -41,13 +41,11 @@ InexactRig::Step InexactRig::next_step(const Arrival& arrival) const {
 }
 
 /// The fit at other numbers: theta by the step, and from there to its best.
-Arrival InexactRig::moved(const Arrival& from, const Step& step, double part) {
+InexactRig::Candidate InexactRig::moved(const Arrival& from, const Step& step, double part) const {
   const VectorXd there = z_ + part * step.deviations;
   auto problem = std::make_shared<FitProblem>();
   problem->rig = numbers_.rig_at(there);
-  const VectorXd before = std::exchange(z_, there);
-  problem->runs = runs();
-  z_ = before;
+  for (std::size_t r = 0; r < stated_->runs.size(); ++r) problem->runs.push_back(numbers_.run_at(r, there));
   problem->circulation = stated_->circulation;
   problem->effects = stated_->effects;
   problem->start = stated_->start;
@@ -73,9 +71,8 @@ Arrival InexactRig::moved(const Arrival& from, const Step& step, double part) {
     const double held_off = u.held ? p.start - from.joint.parameter(u).start : 0;  // what is held at the rig file's number goes with it
     u.value = std::clamp(u.value + held_off + part * step.unknowns[static_cast<Index>(i)], p.lower, p.upper);
   }
-  z_ = there;
-  earlier_.push_back(std::exchange(problem_, std::move(problem)));
-  return next;
+  solve(next);
+  return {there, std::move(problem), std::move(next)};
 }
 
 std::vector<Run> InexactRig::runs() const {
@@ -102,26 +99,24 @@ void InexactRig::search(Arrival& arrival) {
     slopes_ = number_slopes(arrival, numbers_, z_);  // anew: masses and stiffness move the runs alike to one part in thousands, and so must their slopes agree
     const Step step = next_step(arrival);
     if (step.length < near) return;
-    const double before = cost(arrival), promised = step.length * step.length;
-    const VectorXd from = z_;
+    const double before = arrival.joint.chi2() + z_.squaredNorm(), promised = step.length * step.length;
     bool better = false;
     for (double part = 1; !better && part > std::pow(0.5, most_halvings); part /= 2) {
-      z_ = from;
       try {
-        Arrival next = moved(arrival, step, part);
-        solve(next);
-        constexpr double rounding = 1e-9;
-        better = cost(next) < before + std::min(0.0, -1e-4 * part * promised) + rounding * before;
-        if (better) arrival = std::move(next);
+        Candidate next = moved(arrival, step, part);
+        constexpr double enough = 1e-4;  // of what the step promises (L. Armijo, Pacific J. Math. 16 (1966) 1)
+        better = next.cost() < before - enough * part * promised;
+        if (!better) continue;
+        arrival = std::move(next.arrival);
+        problem_ = std::move(next.problem);
+        z_ = std::move(next.z);
       } catch (const std::invalid_argument&) {  // no rig has such numbers
       }
     }
-    if (better) continue;
-    z_ = from;
-    arrival.converged = false;
-    arrival.message = "no step from the numbers of the rig file that is smaller than their uncertainty improves the fit";
-    return;
+    if (!better) break;
   }
+  arrival.converged = false;
+  arrival.message = "no numbers within what rig file and runs state were found that fit best; are the stated uncertainties right?";
 }
 
 void InexactRig::describe(const JointProblem& joint, const InexactUncertainty& uncertainty, FitResult& result) const {

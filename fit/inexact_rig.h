@@ -41,14 +41,18 @@ class InexactRig {
     double length = 0;    ///< in its own standard deviations
   };
   Step next_step(const Arrival& arrival) const;
-  double cost(const Arrival& arrival) const { return arrival.joint.chi2() + z_.squaredNorm(); }
-  Arrival moved(const Arrival& from, const Step& step, double part);
+  struct Candidate {
+    Eigen::VectorXd z;
+    std::shared_ptr<const FitProblem> problem;  ///< whose runs the arrival looks at
+    Arrival arrival;
+    double cost() const { return arrival.joint.chi2() + z.squaredNorm(); }
+  };
+  Candidate moved(const Arrival& from, const Step& step, double part) const;
 
   const FitProblem* stated_;
   StatedNumbers numbers_;
   Eigen::VectorXd z_;
-  std::shared_ptr<const FitProblem> problem_;
-  std::vector<std::shared_ptr<const FitProblem>> earlier_;  ///< whose runs arrivals that were compared may still look at
+  std::shared_ptr<const FitProblem> problem_;  ///< at z_; none while they are the stated ones
   std::optional<NumberSlopes> slopes_;
 };
 
