@@ -9,6 +9,7 @@
 
 #include "core/rig_chain.h"
 #include "core/rig_gauge.h"
+#include "core/stated_errors.h"
 #include "core/text_file.h"
 #include "core/text_kind.h"
 #include "core/toml_table.h"
@@ -43,7 +44,7 @@ int element_number(const TomlTable& table, std::string_view key, Index elements)
 // ------------------------------------------------------------------------------------------------------ structure
 
 void take_section(const TomlTable& section, Rig& rig) {
-  section.allow_only({"chord", "pitch_axis"});
+  section.allow_only({"chord", "pitch_axis", "chord_std", "chord_std_percent", "pitch_axis_std", "pitch_axis_std_percent"});
   rig.chord = section.positive_quantity("chord", "m");
   rig.pitch_axis = section.number("pitch_axis");
   if (rig.pitch_axis < 0 || rig.pitch_axis > 1) {
@@ -76,7 +77,7 @@ void take_chains(const TomlTable& file, Rig& rig) {
 }
 
 void take_submerged(const TomlTable& submerged, Rig& rig) {
-  submerged.allow_only({"elements", "strip_length"});
+  submerged.allow_only({"elements", "strip_length", "strip_length_std", "strip_length_std_percent"});
   rig.strip_length = submerged.positive_quantity("strip_length", "m");
   rig.submerged = submerged.integers("elements");
   int before = 0;
@@ -180,7 +181,8 @@ void take_gauge_gain(const TomlTable& table, ModalMode& mode) {
 }
 
 ModalMode read_mode(const TomlTable& table) {
-  table.allow_only({"mass", "frequency", "damping_ratio", "gauge_gain"});
+  table.allow_only({"mass", "frequency", "damping_ratio", "gauge_gain", "mass_std", "mass_std_percent", "frequency_std", "frequency_std_percent", "damping_ratio_std",
+                    "damping_ratio_std_percent", "gauge_gain_std", "gauge_gain_std_percent"});
   ModalMode mode;
   mode.mass = table.positive_quantity("mass", "kg");
   mode.frequency = table.positive_quantity("frequency", "Hz");
@@ -226,6 +228,7 @@ Rig read_rig(const std::string& path) {
   } else {
     take_structure(file, rig);
   }
+  rig.givens = stated_errors(file, rig);
   return rig;
 }
 

@@ -60,7 +60,7 @@ MatrixXd read_std(const TomlTable& given, const MatrixXd& rows, double scale) {
 
 void read_given_flexibility(const TomlTable& chain, std::string_view si, Chain& result, std::vector<std::string>& warnings) {
   const TomlTable given = chain.table("flexibility");
-  given.allow_only({"unit", "scale", "rows", "std_rows", "std_percent"});
+  given.allow_only({"unit", "scale", "rows", "std_rows", "std_percent", "common_std_percent"});
   const double unit = unit_scale(given.text("unit"), si, given.place("unit"), given.full_name("unit")).factor;
   const double scale = unit * given.number_or("scale", 1);
   const MatrixXd rows = scale * given.square("rows", result.inertia.size());
@@ -145,9 +145,33 @@ bool is_from_drawings(const TomlTable& chain, std::initializer_list<const char*>
 
 }  // namespace
 
+SteppedBeam drawn_beam(const TomlTable& normal, const VectorXd& station) {
+  const Index count = station.size();
+  SteppedBeam beam;
+  beam.station = station;
+  beam.length = positive_quantities(normal, "length", "m", count);
+  beam.stiffness =
+      positive_quantities(normal, "youngs_modulus", "Pa", count).cwiseProduct(positive_quantities(normal, "second_moment", "m^4", count));
+  beam.clamp_rotation = compliance(normal, "clamp_spring", "N.m/rad");
+  beam.clamp_translation = compliance(normal, "clamp_translation", "N/m");
+  return beam;
+}
+
+SteppedBeam drawn_shaft(const TomlTable& torsion, const TomlTable& normal) {
+  const Index count = torsion.quantities("inertia", "kg.m^2").size();
+  SteppedBeam shaft;
+  shaft.station = torsion_layout(torsion, normal, "station", count);
+  shaft.length = positive(torsion, "length", "m", torsion_layout(torsion, normal, "length", count));
+  shaft.stiffness = positive_quantities(torsion, "shear_modulus", "Pa", count).cwiseProduct(torsion_constants(torsion, count));
+  shaft.clamp_rotation = compliance(torsion, "clamp_spring", "N.m/rad");
+  return shaft;
+}
+
 Chain read_normal_chain(const TomlTable& normal, const VectorXd& station, std::vector<std::string>& warnings) {
   normal.allow_only({"station", "mass", "mass_centre", "modes", "flexibility", "length", "youngs_modulus", "second_moment", "clamp_spring",
-                     "clamp_translation"});
+                     "clamp_translation", "mass_std", "mass_std_percent", "mass_centre_std", "mass_centre_std_percent", "length_std", "length_std_percent", "youngs_modulus_std",
+                     "youngs_modulus_std_percent", "second_moment_std", "second_moment_std_percent", "clamp_spring_std", "clamp_spring_std_percent", "clamp_translation_std",
+                     "clamp_translation_std_percent"});
   const Index count = station.size();
   Chain chain;
   chain.inertia = positive_quantities(normal, "mass", "kg", count);
@@ -156,20 +180,15 @@ Chain read_normal_chain(const TomlTable& normal, const VectorXd& station, std::v
     read_given_flexibility(normal, "m/N", chain, warnings);
     return chain;
   }
-  SteppedBeam beam;
-  beam.station = station;
-  beam.length = positive_quantities(normal, "length", "m", count);
-  beam.stiffness =
-      positive_quantities(normal, "youngs_modulus", "Pa", count).cwiseProduct(positive_quantities(normal, "second_moment", "m^4", count));
-  beam.clamp_rotation = compliance(normal, "clamp_spring", "N.m/rad");
-  beam.clamp_translation = compliance(normal, "clamp_translation", "N/m");
+  const SteppedBeam beam = drawn_beam(normal, station);
   chain.flexibility = at_place(normal, "length", end_to_end, [&beam] { return bending_flexibility(beam); });
   return chain;
 }
 
 Chain read_torsion_chain(const TomlTable& torsion, const TomlTable& normal, std::vector<std::string>& warnings) {
   torsion.allow_only(
-      {"inertia", "modes", "rigid_from", "flexibility", "station", "length", "shear_modulus", "polar_moment", "section", "clamp_spring"});
+      {"inertia", "modes", "rigid_from", "flexibility", "station", "length", "shear_modulus", "polar_moment", "section", "clamp_spring", "length_std", "length_std_percent", "shear_modulus_std",
+       "shear_modulus_std_percent", "polar_moment_std", "polar_moment_std_percent", "clamp_spring_std", "clamp_spring_std_percent"});
   Chain chain;
   chain.inertia = positive(torsion, "inertia", "kg.m^2", torsion.quantities("inertia", "kg.m^2"));
   const Index count = chain.inertia.size();
@@ -179,11 +198,7 @@ Chain read_torsion_chain(const TomlTable& torsion, const TomlTable& normal, std:
     read_given_flexibility(torsion, "rad/(N.m)", chain, warnings);
     return chain;
   }
-  SteppedBeam shaft;
-  shaft.station = torsion_layout(torsion, normal, "station", count);
-  shaft.length = positive(torsion, "length", "m", torsion_layout(torsion, normal, "length", count));
-  shaft.stiffness = positive_quantities(torsion, "shear_modulus", "Pa", count).cwiseProduct(torsion_constants(torsion, count));
-  shaft.clamp_rotation = compliance(torsion, "clamp_spring", "N.m/rad");
+  const SteppedBeam shaft = drawn_shaft(torsion, normal);
   chain.flexibility = at_place(torsion, "length", end_to_end, [&shaft] { return torsion_flexibility(shaft); });
   return chain;
 }

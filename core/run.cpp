@@ -15,6 +15,7 @@
 #include "core/bad_readings.h"
 #include "core/csv_table.h"
 #include "core/run_limits.h"
+#include "core/stated_errors.h"
 #include "core/text_file.h"
 #include "core/text_kind.h"
 #include "core/time_grid.h"
@@ -116,7 +117,9 @@ double not_negative(const TomlTable& meta, std::string_view key, std::string_vie
 
 Run read_meta_data(const TomlTable& meta, const std::string& path) {
   check_run_version(meta, path);
-  meta.allow_only({"unrig_run", "name", "kind", "medium", "density", "speed", "calibration", "force_calibration"});
+  meta.allow_only({"unrig_run", "name", "kind", "medium", "density", "speed", "calibration", "force_calibration", "density_std", "density_std_percent", "density_error", "speed_std",
+                   "speed_std_percent", "speed_error", "calibration_std", "calibration_std_percent", "calibration_error", "force_calibration_std", "force_calibration_std_percent",
+                   "force_calibration_error", "clock_std_percent", "clock_error"});
   Run run;
   run.file = path;
   run.name = meta.text_or("name", std::filesystem::path(path).stem().string());
@@ -125,6 +128,7 @@ Run read_meta_data(const TomlTable& meta, const std::string& path) {
   run.density = not_negative(meta, "density", "kg/m^3");
   run.speed = not_negative(meta, "speed", "m/s");
   check_conditions(meta, run);
+  run.givens = stated_errors_of_run(meta, run);
   return run;
 }
 

@@ -135,6 +135,13 @@ std::vector<std::string> TomlTable::texts(std::string_view key) const {
   return values;
 }
 
+Eigen::VectorXd TomlTable::numbers(std::string_view key) const {
+  const toml::array& list = array(key, "wanted a list of numbers");
+  Eigen::VectorXd values(static_cast<Eigen::Index>(list.size()));
+  for (Eigen::Index k = 0; k < values.size(); ++k) values[k] = finite(list[static_cast<std::size_t>(k)], key, fmt::format("[{}]", k + 1));
+  return values;
+}
+
 double TomlTable::quantity(std::string_view key, std::string_view si) const {
   const toml::node& node = required(key);
   if (const auto* text = node.as_string()) return unrig::quantity(text->get(), si, place(key), full_name(key));
@@ -180,15 +187,10 @@ Eigen::VectorXd TomlTable::quantities(std::string_view key, std::string_view si)
          fmt::format("wanted {0}.unit, which converts to {1}, and {0}.values", full_name(key), si));
   }
   const TomlTable measured = table(key);
-  measured.allow_only({"unit", "values", "scale"});
+  measured.allow_only({"unit", "values", "scale", "std", "std_percent", "std_values", "common_std_percent"});
   const UnitScale scale = unit_scale(measured.text("unit"), si, measured.place("unit"), measured.full_name("unit"));
   const double factor = measured.number_or("scale", 1);
-  const toml::array& list = measured.array("values", "wanted a list of numbers");
-  Eigen::VectorXd values(static_cast<Eigen::Index>(list.size()));
-  for (Eigen::Index k = 0; k < values.size(); ++k) {
-    values[k] = scale(factor * measured.finite(list[static_cast<std::size_t>(k)], "values", fmt::format("[{}]", k + 1)));
-  }
-  return values;
+  return (factor * measured.numbers("values")).unaryExpr(scale);
 }
 
 Eigen::VectorXd TomlTable::quantities(std::string_view key, std::string_view si, Eigen::Index count) const {

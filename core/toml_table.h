@@ -16,7 +16,8 @@ namespace unrig {
 /// InputError with file, line, the key's full name, what was found and what is wanted.
 ///
 /// Numbers with a unit come in two forms: one value as text, `chord = "6 in"`, and one value per element as a table,
-/// `station.unit = "in"`, `station.values = [..]` (or `.rows = [[..], ..]`), times an optional `.scale`.
+/// `station.unit = "in"`, `station.values = [..]` (or `.rows = [[..], ..]`), times an optional `.scale`. What an array states of
+/// its errors stands beside them (core/stated_errors.h).
 class TomlTable {
  public:
   /// Parses `text`, whose first line is line 1 of `file`. `advice` ends the message about text that is no TOML.
@@ -44,6 +45,8 @@ class TomlTable {
   int integer(std::string_view key) const;
   std::vector<int> integers(std::string_view key) const;
   std::vector<std::string> texts(std::string_view key) const;
+  /// A list of plain numbers.
+  Eigen::VectorXd numbers(std::string_view key) const;
   /// One value with its unit, in SI.
   double quantity(std::string_view key, std::string_view si) const;
   double positive_quantity(std::string_view key, std::string_view si) const;

@@ -10,14 +10,14 @@
 #include <fmt/format.h>
 
 #include "core/effects/effect.h"
-#include "core/gauge_lever.h"
 #include "core/in_parallel.h"
 #include "core/indicial_table.h"
-#include "core/rigid_load.h"
 #include "core/run_inputs.h"
 #include "core/run_limits.h"
 #include "correct/how_far_to_trust.h"
+#include "correct/inexact_load.h"
 #include "correct/knots.h"
+#include "correct/load_in_legs.h"
 #include "correct/misfit.h"
 #include "correct/prior.h"
 #include "correct/restless_correction.h"
@@ -142,18 +142,6 @@ MatrixXd interpolated(const MatrixXd& value, const std::vector<Index>& at, Index
   return all;
 }
 
-/// Load per reading where it is spread evenly over the strips: `check` has seen to it that the gauge feels them.
-double steady_per_reading(const Rig& rig) { return 1 / gauge_reading_of_unit_load(rig); }
-
-/// Loads of the rigid rig at theta and c of a leg that goes on `from` the one before, and how they move at `at`.
-RigidLoad load_at(const RunResidual& residual, const VectorXd& theta, const VectorXd& c, const std::vector<Index>& at, const RigidLoad::State& from) {
-  RigidLoad load = rigid_load(residual.model(), residual.conditions(), theta, residual.motion(), residual.run().dt, c.head(residual.motion().unknowns()), at, from);
-  const double steady = steady_per_reading(residual.model().rig()) * c[residual.first_offset()];  // the gauge comes first among the channels
-  load.circulatory.array() += steady;
-  load.normal_force.array() += steady;
-  return load;
-}
-
 /// By how much more than noise what a run is left with moves its circulatory load; 1 at least, and where it has no number.
 double moved_beyond_noise(const RunResidual& residual, const RunResidual::Evaluation& e, const Prior& prior, const VectorXd& theta, double reduced_chi2) {
   if (!std::isfinite(reduced_chi2)) return 1;
@@ -203,20 +191,6 @@ void set_loads(const RunInLegs& legs, const std::vector<RunResidual::Evaluation>
   result.normal_force.simultaneous = simultaneous_factor_of_length(normal_force.sum());
 }
 
-/// Both loads in turn, at theta and the legs' c.
-std::pair<VectorXd, VectorXd> loads_at(const RunInLegs& legs, const VectorXd& theta, const std::vector<VectorXd>& c) {
-  const Index n = legs.samples(legs.size() - 1).last;
-  VectorXd circulatory(n), normal_force(n);
-  RigidLoad::State from;
-  for (std::size_t p = 0; p < legs.size(); ++p) {
-    const RigidLoad load = load_at(legs.residual(p), theta, c[p], {0}, from);
-    circulatory.segment(legs.samples(p).first, legs.samples(p).length()) = load.circulatory;
-    normal_force.segment(legs.samples(p).first, legs.samples(p).length()) = load.normal_force;
-    from = load.behind;
-  }
-  return {circulatory, normal_force};
-}
-
 /// What an error of the calibration does where a run is in legs, which hand it on to each other.
 void add_calibration(const RunInLegs& legs, const std::vector<RunResidual::Evaluation>& by_leg, const std::vector<VectorXd>& answers, const VectorXd& theta, CorrectResult& result) {
   constexpr double small = 1e-3;
@@ -263,6 +237,10 @@ void describe_motion(const RunInLegs& legs, const VectorXd& theta, const Run& ru
   result.onset = run.time(first);
 }
 
+std::string other_readings(const CorrectProblem& problem) {
+  return fmt::format("{}: other readings or conditions than those that {} was fitted to; the band takes them for the fitted ones. Fit again, or give the new recording another name.", problem.run.file, problem.fit.file);
+}
+
 void describe_run(const CorrectProblem& problem, CorrectResult& result) {
   const Run& run = problem.run;
   const Rig& rig = problem.rig;
@@ -275,8 +253,7 @@ void describe_run(const CorrectProblem& problem, CorrectResult& result) {
   result.calibration_uncertainty = problem.calibration_uncertainty > 0 ? problem.calibration_uncertainty : rig.calibration_uncertainty;
   result.imposed = problem.imposed;
   result.warnings = run.warnings;
-  if (problem.fit.had_other_readings(run, problem.rig))
-    result.warnings.push_back(fmt::format("{}: other readings or conditions than those that {} was fitted to; the band takes them for the fitted ones. Fit again, or give the new recording another name.", run.file, problem.fit.file));
+  if (problem.fit.had_other_readings(run, problem.rig)) result.warnings.push_back(other_readings(problem));
 }
 
 /// Behind shorter ones the slope of a step of `sample_data/campaigns/null` that was cut was three of its standard deviations off and more; from 3.2 on one at most.
@@ -388,9 +365,8 @@ std::vector<Windows> legs_to_follow(const AeroelasticModel& model, const Run& ru
   return {windows};
 }
 
-}  // namespace
-
-CorrectResult correct(const CorrectProblem& problem) {
+/// `numbers`: of a rig or run that states uncertainties, at whose numbers `problem` stands; null where nothing is stated.
+CorrectResult correct_at(const CorrectProblem& problem, const FittedNumbers* numbers) {
   check(problem);
   const Run& run = problem.run;
   CorrectResult result;
@@ -408,6 +384,7 @@ CorrectResult correct(const CorrectProblem& problem) {
   const std::vector<Windows> windows_by_leg = legs_to_follow(model, run, start, windows, result.warnings);
   if (windows_by_leg.empty()) {
     correct_restless({model, run, prior, start, length, steady_per_reading(problem.rig), problem.imposed}, result);
+    if (numbers) result.warnings.push_back(fmt::format("{}: the shaft hardly ever rests; the band of such a run does not allow for the uncertainties that rig file and run state.", run.file));
     look_at_what_is_left(run, 2 * run.samples(), 1, result);
     return result;
   }
@@ -452,7 +429,34 @@ CorrectResult correct(const CorrectProblem& problem) {
   result.determined = best.determined;
   result.amplitudes = static_cast<Index>(best.prior.amplitudes.size());
   result.in_fit = !best.prior.held.empty();
+  if (numbers) add_numbers({legs, model, best, *numbers, result.indicial.semichords}, result);
   look_at_what_is_left(run, legs.degrees_of_freedom(), beyond_noise, result);
+  return result;
+}
+
+/// Times as they were recorded.
+void take_recorded_times(const Run& recorded, const Run& corrected, CorrectResult& result) {
+  result.onset *= recorded.dt / corrected.dt;
+  result.start = recorded.start;
+  result.dt = recorded.dt;
+}
+
+}  // namespace
+
+CorrectResult correct(const CorrectProblem& problem) {
+  const FittedNumbers numbers(problem.fit, problem.rig, problem.run);
+  if (!numbers.any()) return correct_at(problem, nullptr);
+  refuse_other_rig(problem.rig, problem.fit);
+  CorrectProblem at = problem;
+  at.rig = numbers.rig();
+  at.run = numbers.run();
+  at.fit = numbers.with_numbers_known();
+  at.fit.rig_fingerprint.clear();  // compared above: rig and run stand at other numbers from here on
+  at.fit.fingerprints.clear();
+  CorrectResult result = correct_at(at, &numbers);
+  take_recorded_times(problem.run, at.run, result);
+  if (problem.fit.had_other_readings(problem.run, problem.rig)) result.warnings.push_back(other_readings(problem));
+  result.warnings.insert(result.warnings.end(), numbers.warnings().begin(), numbers.warnings().end());
   return result;
 }
 

@@ -37,6 +37,7 @@ struct CorrectResult {
   Eigen::VectorXd unexplained;      ///< the reading minus the model's [N]
   CorrectedLoad normal_force;       ///< load of the rigid rig
   CorrectedLoad circulatory;        ///< its circulatory part
+  Eigen::VectorXd coefficient_std = {};  ///< of normal_force / force_per_coefficient, where the latter is uncertain too; else empty
   IndicialResponse indicial;
   double slope = 0, slope_std = 0;  ///< normal-force slope per radian, the limit of the response
   double reduced_chi2 = 0;

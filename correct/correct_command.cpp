@@ -12,6 +12,7 @@
 #include "correct/correct.h"
 #include "correct/corrected_files.h"
 #include "correct/modal_load.h"
+#include "fit/fitted_numbers.h"
 
 namespace unrig {
 
@@ -59,7 +60,16 @@ int correct_command(int argc, char** argv) {
   if (problem.rig.is_modal()) {
     if (imposed.any() || !indicial.empty())
       throw InputError({rig_path, 0}, "a rig known only as modes", "wanted a rig with a section for an indicial response", "Leave out --indicial, --monotone and --at-step.");
-    finish(modal_load(problem), output, {}, made_by, progress);
+    refuse_other_rig(problem.rig, problem.fit);
+    CorrectProblem at = problem;
+    const FittedNumbers numbers(problem.fit, problem.rig, problem.run);
+    if (numbers.any()) {
+      at.rig = numbers.rig();
+      at.run = numbers.run();
+      at.fit.rig_fingerprint.clear();
+      warn("the band of the load does not allow for the uncertainties that rig file and run state: it does so for a rig with a section only");
+    }
+    finish(modal_load(at), output, {}, made_by, progress);
     return exit_done;
   }
   const CorrectResult result = correct(problem);

@@ -50,7 +50,7 @@ void to_csv(const TextSink& sink, const CorrectResult& r, const MadeBy& made_by)
     fmt::format_to(out, "{:.9g},{:.9g},", t, (t - r.onset) * r.semichords_per_second);
     if (std::isfinite(r.gauge[k])) fmt::format_to(out, "{:.6g}", r.gauge[k]);
     fmt::format_to(out, ",{:.6g},{:.4g},{:.6g},{:.4g},{:.6g},{:.4g}", normal.value[k], normal.std[k], circulatory.value[k], circulatory.std[k],
-                   normal.value[k] / r.force_per_coefficient, normal.std[k] / r.force_per_coefficient);
+                   normal.value[k] / r.force_per_coefficient, r.coefficient_std.size() > 0 ? r.coefficient_std[k] : normal.std[k] / r.force_per_coefficient);
     for (const CorrectedLoad* load : {&circulatory, &normal})
       further_cells(out, load->by_source.row(k), load->simultaneous * load->std[k], load->half_weight[k], load->twice_weight[k]);
     row.push_back(',');

@@ -98,7 +98,7 @@ RunInLegs::Ties RunInLegs::ties() const {
   return ties;
 }
 
-RunInLegs::RunInLegs(const AeroelasticModel& model, const Run& run, const std::vector<Windows>& legs) : model_(&model) {
+RunInLegs::RunInLegs(const AeroelasticModel& model, const Run& run, const std::vector<Windows>& legs) : model_(&model), windows_(legs) {
   if (legs.size() == 1) {
     legs_.push_back({{0, run.samples()}, {}, RunResidual(model, run, legs.front()), {}});
     return;
@@ -113,6 +113,18 @@ RunInLegs::RunInLegs(const AeroelasticModel& model, const Run& run, const std::v
     legs_.back().residual.emplace(model, legs_.back().own, windows, options);
     if (p > 0) legs_.back().residual->share_responses_with(*legs_.front().residual);
   }
+}
+
+RunInLegs RunInLegs::held_against(const AeroelasticModel& model, const Run& run) const {
+  RunInLegs other(model, run, windows_);
+  for (std::size_t p = 0; p < size(); ++p) {
+    other.residual(p).keep_noise_of(residual(p));
+    other.residual(p).follow_in(residual(p).finer());
+    other.residual(p).start_from(residual(p));
+    other.legs_[p].motion_prior = legs_[p].motion_prior;
+    if (legs_[p].motion_prior.rows() > 0) other.residual(p).set_motion_prior(legs_[p].motion_prior);
+  }
+  return other;
 }
 
 RunResidual::Solution RunInLegs::solve(const VectorXd& theta) {

@@ -30,6 +30,9 @@ class RunInLegs {
   /// Windows by legs, in samples of the run. More than one leg only for a linear model without measured inputs and signals, whose states would begin anew in each (correct.cpp sees to that).
   RunInLegs(const AeroelasticModel& model, const Run& run, const std::vector<Windows>& legs);
 
+  /// The same legs, noise levels and priors of the motions against another model, and the run at other numbers of its head.
+  RunInLegs held_against(const AeroelasticModel& model, const Run& run) const;
+
   /// The sum over all legs: `linear` and `model` are those of a single leg, empty for several. chi-square infinite where one has no answer.
   RunResidual::Solution solve(const Eigen::VectorXd& theta);
   /// Throws NoAnswer where several legs have no answer at that theta.
@@ -72,6 +75,7 @@ class RunInLegs {
     Eigen::MatrixXd motion_prior;
   };
   const AeroelasticModel* model_;
+  std::vector<Windows> windows_;
   std::deque<Leg> legs_;
   std::vector<RunResidual::Solution> solutions_;
   std::vector<RunResidual::Evaluation> evaluations_;  ///< at the theta of the solutions; empty where they were not asked for

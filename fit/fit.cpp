@@ -14,6 +14,7 @@
 #include "fit/effect_search.h"
 #include "fit/fit_description.h"
 #include "fit/gauss_newton.h"
+#include "fit/inexact_rig.h"
 #include "fit/out_of_proportion.h"
 #include "fit/run_order.h"
 #include "fit/uncertainty.h"
@@ -97,7 +98,7 @@ AeroelasticModel model_of(const Rig& rig, const std::vector<Run>& runs, Wagner c
   return complete({rig, basis, wagner(circulation)});
 }
 
-FitResult describe_fit(Arrival& arrival, const FitProblem& problem, Settle first) {
+FitResult describe_fit(Arrival& arrival, const FitProblem& problem, Settle first, InexactRig* inexact) {
   FitResult result;
   result.rig_file = problem.rig.file;
   result.rig_fingerprint = fingerprint(problem.rig);
@@ -106,7 +107,13 @@ FitResult describe_fit(Arrival& arrival, const FitProblem& problem, Settle first
   result.warnings = problem.rig.warnings;
   for (const Run& run : problem.runs) result.warnings.insert(result.warnings.end(), run.warnings.begin(), run.warnings.end());
   for (RunResidual& run : arrival.joint.runs()) run.temper(1);
-  const ParameterUncertainty uncertainty = first == Settle::nothing ? estimate_uncertainty(arrival.joint) : settle(arrival, problem, first == Settle::steps);
+  ParameterUncertainty uncertainty = first == Settle::nothing ? estimate_uncertainty(arrival.joint) : settle(arrival, problem, first == Settle::steps);
+  InexactUncertainty with_numbers;
+  if (inexact) {
+    inexact->search(arrival);
+    with_numbers = inexact->uncertainty(arrival);
+    uncertainty = with_numbers.parameters;
+  }
   result.normal_modes = arrival.model->basis().normal_modes;
   result.torsion_modes = arrival.model->basis().torsion_modes;
   result.evaluations = arrival.evaluations;
@@ -125,6 +132,11 @@ FitResult describe_fit(Arrival& arrival, const FitProblem& problem, Settle first
     result.runs.push_back(describe_run(run, joint.theta(r), run.is_aside() ? run.evaluate(joint.theta(r), Partials::none).chi2 : lin.run_chi2[r]));
   }
   describe_parameters(joint, uncertainty, problem.start, result);
+  if (inexact) inexact->describe(joint, with_numbers, result);
+  if (inexact && !problem.profile.empty()) {
+    result.warnings.push_back("profiles are those with the numbers of rig file and runs known; the standard errors allow for what they state");
+    uncertainty = estimate_uncertainty(joint);
+  }
   describe_profiles(joint, uncertainty, problem, result);
   judge_answer(result);
   warn_of_silent_runs(joint, result);
@@ -142,7 +154,9 @@ FitResult fit_in_order(const FitProblem& problem) {
   check_names(*model, problem);
   Arrival arrival = problem.effects.empty() ? arrive(problem, model) : arrive_at_effects(problem);
   check_lengths(arrival.joint);
-  FitResult result = describe_fit(arrival, problem, Settle::steps);
+  std::optional<InexactRig> inexact;
+  if (states_errors(problem.rig, problem.runs)) inexact.emplace(problem).search(arrival);
+  FitResult result = describe_fit(arrival, problem, Settle::steps, inexact ? &*inexact : nullptr);
   result.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
   return result;
 }

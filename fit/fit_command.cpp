@@ -15,6 +15,7 @@
 #include "fit/effect_option.h"
 #include "fit/fit.h"
 #include "fit/fit_files.h"
+#include "fit/price.h"
 
 namespace unrig {
 
@@ -24,6 +25,7 @@ int fit_command(int argc, char** argv) {
   std::string rig_path, output, circulation = "1e-4";
   std::vector<std::string> run_paths, starts, effect_ids;
   double least = 0.1;
+  bool price = false;
   app.add_option("--rig", rig_path, "rig file (TOML)")->required();
   app.add_option("runs", run_paths, "run files (CSV): free decays and steps of this rig, one or more");
   app.add_option("-o,--output", output, "result (JSON)")->required();
@@ -33,6 +35,7 @@ int fit_command(int argc, char** argv) {
   app.add_option("--wagner", circulation, "circulatory build-up: 1e-4, 1e-6 (largest error), jones, seed")->capture_default_str();
   app.add_option_function<int>("--threads", use_threads, "how many threads to work in; without it, as many as the machine has")->check(CLI::Range(1, 256));
   app.add_option("--correlations", least, "smallest correlation to report")->capture_default_str();
+  app.add_flag("--price", price, "how much an error of one per cent of masses, stations, chord, speed and the other numbers would move the result");
   app.footer(effect_list() + "\nExample:\n  unrig fit --rig rig.toml dry_pluck.csv wet_pluck.csv step_a.csv -o fit.json");
   try {
     parse_command_line(app, argc, argv);
@@ -82,6 +85,7 @@ int fit_command(int argc, char** argv) {
   for (const std::string& warning : result.warnings) warn(warning);
   write_text(output, to_json(result));
   fmt::print("{}", report(result, least));
+  if (price && result.no_answer.empty()) fmt::print("{}", result.givens.empty() ? report(price_of_numbers(problem, result)) : "The price: uncertainties are stated, and are in the errors above.\n");
   if (result.no_answer.empty()) return exit_done;
   warn("no trustworthy answer: " + result.no_answer);
   return exit_no_answer;

@@ -52,14 +52,6 @@ MatrixXd covariance_of_all(const JointProblem& joint, const ParameterUncertainty
   return covariance + off * off.transpose();
 }
 
-/// What a steady load before the motion reads in a run, per unit coefficient on all strips; 0 where there is none, or no gauge that shows it.
-double reading_of_steady_load(const RunResidual& residual) {
-  const Rig& rig = residual.model().rig();
-  const Conditions& c = residual.conditions();
-  if (rig.is_modal() || rig.gauge_element == 0 || c.speed == 0 || residual.channels().front() != "gauge") return 0;
-  return gauge_reading_of_unit_coefficient(rig, c.density, c.speed);
-}
-
 /// Steady load before the motion as a coefficient: the offset of the gauge. The gauge's own zero cannot be told from it. The variances are the offset's.
 FittedParameter steady_load(const RunResidual& residual, const VectorXd& theta, double unit_reading, double variance, double white, double coloured) {
   FittedParameter steady;
@@ -83,6 +75,13 @@ MatrixXd correlation_of(const MatrixXd& covariance) {
 }
 
 }  // namespace
+
+double reading_of_steady_load(const RunResidual& residual) {
+  const Rig& rig = residual.model().rig();
+  const Conditions& c = residual.conditions();
+  if (rig.is_modal() || rig.gauge_element == 0 || c.speed == 0 || residual.channels().front() != "gauge") return 0;
+  return gauge_reading_of_unit_coefficient(rig, c.density, c.speed);
+}
 
 void check_lengths(const JointProblem& joint) {
   for (const RunResidual& run : joint.runs())

@@ -14,8 +14,13 @@ namespace unrig {
 /// nonlinear laws are followed halved until that moves nothing, which takes several times as long.
 enum class Settle { nothing, noise, steps };
 
-/// All of it.
-FitResult describe_fit(Arrival& arrival, const FitProblem& problem, Settle first);
+class InexactRig;
+
+/// All of it. `inexact`: of a rig that states uncertainties of its numbers, which `arrival` was found with; the search goes on once the rest has been looked at again.
+FitResult describe_fit(Arrival& arrival, const FitProblem& problem, Settle first, InexactRig* inexact = nullptr);
+
+/// What a steady load before the motion reads in a run, per unit coefficient on all strips; 0 where there is none, or no gauge that shows it.
+double reading_of_steady_load(const RunResidual& residual);
 
 FittedRun describe_run(const RunResidual& residual, const Eigen::VectorXd& theta, double chi2);
 

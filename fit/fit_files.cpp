@@ -63,6 +63,53 @@ json number(double x) { return std::isfinite(x) ? json(x) : json(nullptr); }
 template <class Named>
 std::string label(const Named& p) { return p.run.empty() ? p.name : p.name + " (" + base_name(p.run) + ")"; }
 
+/// The numbers that stated their uncertainty, and their covariance with the parameters.
+void add_givens(const FitResult& r, json& out) {
+  out["givens"] = json::array();
+  for (const FittedGiven& g : r.givens) {
+    json item = {{"name", g.name}, {"stated", g.stated}, {"stated_std", g.stated_std}, {"value", number(g.value)}, {"std_error", number(g.std_error)}, {"unit", g.unit}};
+    if (!g.run.empty()) item["run"] = g.run;
+    out["givens"].push_back(item);
+  }
+  out["joint_covariance"] = json::array();
+  for (Eigen::Index i = 0; i < r.joint_covariance.rows(); ++i) {
+    json row = json::array();
+    for (Eigen::Index j = 0; j < r.joint_covariance.cols(); ++j) row.push_back(number(r.joint_covariance(i, j)));
+    out["joint_covariance"].push_back(row);
+  }
+}
+
+void read_givens(const json& in, FittedRig& fit) {
+  for (const json& item : in.at("givens")) {
+    FittedGiven g;
+    g.name = item.at("name").get<std::string>();
+    g.unit = item.value("unit", "");
+    g.run = item.value("run", "");
+    g.stated = item.at("stated").get<double>();
+    g.stated_std = item.at("stated_std").get<double>();
+    g.value = item.at("value").get<double>();
+    g.std_error = item.at("std_error").get<double>();
+    fit.givens.push_back(std::move(g));
+  }
+  const json& rows = in.at("joint_covariance");
+  const auto n = static_cast<Eigen::Index>(fit.parameters.size() + fit.givens.size());
+  fit.joint_covariance.resize(n, n);
+  for (Eigen::Index i = 0; i < n; ++i)
+    for (Eigen::Index j = 0; j < n; ++j) fit.joint_covariance(i, j) = rows.at(static_cast<std::size_t>(i)).at(static_cast<std::size_t>(j)).get<double>();
+}
+
+/// The numbers of the rig file and of the runs' heads, before and after.
+std::string report_givens(const FitResult& r) {
+  if (r.givens.empty()) return "";
+  std::size_t width = 0;
+  for (const FittedGiven& g : r.givens) width = std::max(width, label(g).size());
+  std::string text = "[[Givens]] (value, in brackets as stated; shift, and standard deviation after, in stated standard deviations)\n";
+  for (const FittedGiven& g : r.givens)
+    text += fmt::format("    {:<{}} {: .6g} +/- {:.3g}{} (stated {:.6g} +/- {:.3g}) shift {:+.2f}, after {:.2f}\n", label(g) + ":", width + 1, g.value, g.std_error, g.unit == "1" ? "" : " " + g.unit, g.stated, g.stated_std,
+                        (g.value - g.stated) / g.stated_std, g.std_error / g.stated_std);
+  return text;
+}
+
 }  // namespace
 
 std::string to_json(const FitResult& r) {
@@ -115,6 +162,7 @@ std::string to_json(const FitResult& r) {
     for (Eigen::Index j = 0; j < r.correlation.cols(); ++j) row.push_back(number(r.correlation(i, j)));
     out["correlation"].push_back(row);
   }
+  if (!r.givens.empty()) add_givens(r, out);
   out["runs"] = json::array();
   for (const FittedRun& run : r.runs) {
     json channels = json::array();
@@ -185,6 +233,7 @@ FittedRig read_fit(const json& in, const std::string& path) {
           if (!(std::abs(c) <= 1) || (i == j && c != 1)) throw refuse(fmt::format("a correlation of {:g} in row {}, column {}", c, i + 1, j + 1));
         }
     }
+    if (in.contains("givens")) read_givens(in, fit);
     for (const json& run : in.value("runs", json::array())) {
       fit.runs.push_back(run.value("file", ""));
       fit.fingerprints.push_back(run.value("fingerprint", ""));
@@ -250,9 +299,13 @@ const FittedParameter* FittedRig::find(const std::string& name, const std::strin
   return found == parameters.end() ? nullptr : &*found;
 }
 
+void refuse_other_rig(const Rig& rig, const FittedRig& fit) {
+  if (const std::string found = other_rig(rig, fit); !found.empty())
+    throw InputError({rig.file, 0}, found, "wanted the rig of the fit: its parameters multiply the numbers of its rig file", "Fit this rig, or give the rig file as it was.");
+}
+
 void check_is_fit_of(const AeroelasticModel& model, const FittedRig& fit, const std::string& run_file) {
-  if (const std::string found = other_rig(model.rig(), fit); !found.empty())
-    throw InputError({model.rig().file, 0}, found, "wanted the rig of the fit: its parameters multiply the numbers of its rig file", "Fit this rig, or give the rig file as it was.");
+  refuse_other_rig(model.rig(), fit);
   for (const Parameter& p : model.parameters())
     if (!p.per_run && !fit.find(p.name, run_file))
       throw InputError({fit.file, 0}, "no parameter \"" + p.name + "\"", "wanted a fit of the rig " + model.rig().file, "Fit this rig to its free decays and steps first.");
@@ -333,6 +386,7 @@ std::string report(const FitResult& r, double least) {
   for (const ProfiledParameter& p : r.profiles)
     for (const ProfileInterval& i : p.intervals) text += fmt::format("    {:<{}} {}\n", &i == &p.intervals.front() ? label(p) + ":" : "", width + 1, i.text);
 
+  text += report_givens(r);
   std::vector<std::tuple<double, std::string>> pairs;
   for (Eigen::Index i = 0; i < r.correlation.rows(); ++i)
     for (Eigen::Index j = i + 1; j < r.correlation.cols(); ++j)

@@ -19,6 +19,8 @@ struct FittedRig {
   Eigen::Index law_steps = 1;        ///< FitResult::law_steps
   std::vector<FittedParameter> parameters;
   Eigen::MatrixXd correlation;
+  std::vector<FittedGiven> givens;     ///< numbers that stated their uncertainty, as they came out
+  Eigen::MatrixXd joint_covariance;    ///< of `parameters`, then `givens`; empty without givens
   std::vector<std::string> runs;
   std::vector<std::string> fingerprints;  ///< of the runs (core/fingerprint.h), empty in a fit.json of an earlier version
   std::vector<double> onset_angles;  ///< rad, of the runs; not a number in a fit.json of an earlier version, empty in a fit made in code
@@ -43,6 +45,8 @@ std::string fingerprint(const FittedRig& fit);
 
 /// "other numbers in [section] than the rig rig.toml that fit.json was fitted to"; empty where they are the same, or the fit does not say.
 std::string other_rig(const Rig& rig, const FittedRig& fit);
+/// Throws InputError where it has.
+void refuse_other_rig(const Rig& rig, const FittedRig& fit);
 
 /// Throws InputError where the fit says that its rig had other numbers: its parameters are multiples of them, and an answer would be wrong by as much as nobody knows. And where a parameter of the rig is none
 /// of the fit.

@@ -20,6 +20,7 @@
 #include "core/text_file.h"
 #include "core/units.h"
 #include "fit/fit_files.h"
+#include "fit/fitted_numbers.h"
 #include "fit/shaft_motion.h"
 #include "fit/simulated_run.h"
 
@@ -107,7 +108,7 @@ struct ToSimulate {
 };
 
 ToSimulate problem_of(const Options& options, const Provenance& made) {
-  const Rig rig = read_rig(options.rig);
+  Rig rig = read_rig(options.rig);
   for (const std::string& warning : rig.warnings) warn(warning);
   Run run = read_run(options.run);
   for (const std::string& warning : run.warnings) warn(warning);
@@ -121,6 +122,14 @@ ToSimulate problem_of(const Options& options, const Provenance& made) {
                      "another name.",
                      run.file, fit->file));
   const MadeBy made_by{made, fingerprint(rig), fingerprint(run, rig), fit ? fingerprint(*fit) : ""};
+  if (fit && !fit->givens.empty()) {
+    const FittedNumbers numbers(*fit, rig, run);
+    const Rig fitted_rig = numbers.rig();
+    const Run fitted_run = numbers.run();
+    rig = fitted_rig;
+    run = fitted_run;
+    warn(fmt::format("{}: simulated with the numbers of rig and run as the fit adjusted them; one curve, without a band for what they leave uncertain", options.fit));
+  }
   if (!options.as_recorded && !options.jumps) take_out_noise_of_the_angle(rig, run);
 
   std::optional<TabulatedIndicial> table;

@@ -6,6 +6,7 @@
 
 #include "core/command.h"
 #include "core/wagner.h"
+#include "fit/fitted_numbers.h"
 #include "fit/run_residual.h"
 
 namespace unrig {
@@ -27,7 +28,10 @@ void warn_of_another(ReportPage& page, const FittedRig& fit, const Rig& rig, con
   page.add_text("Warning: " + text);
 }
 
-std::vector<FitTrace> fit_traces(const Rig& rig, const FittedRig& fit, const Run& run) {
+std::vector<FitTrace> fit_traces(const Rig& stated_rig, const FittedRig& fit, const Run& stated_run) {
+  const FittedNumbers numbers(fit, stated_rig, stated_run);
+  const Rig rig = numbers.rig();
+  const Run run = numbers.run();
   const Basis basis = rig.is_modal()          ? Basis{}
                       : fit.normal_modes > 0  ? make_basis(rig, fit.normal_modes, fit.torsion_modes)
                                               : make_basis(rig, 0.5 / run.dt, run.density);
