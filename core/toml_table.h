@@ -43,6 +43,7 @@ class TomlTable {
   bool boolean_or(std::string_view key, bool fallback) const;
   int integer(std::string_view key) const;
   std::vector<int> integers(std::string_view key) const;
+  std::vector<double> numbers(std::string_view key) const;
   std::vector<std::string> texts(std::string_view key) const;
   /// One value with its unit, in SI.
   double quantity(std::string_view key, std::string_view si) const;

@@ -11,8 +11,10 @@
 #include "fit/effect_search.h"
 #include "fit/fit_description.h"
 #include "fit/gauss_newton.h"
+#include "fit/no_worse_than_start.h"
 #include "fit/uncertainty.h"
 #include "fit/undetermined.h"
+#include "fit/unfitted_modes.h"
 #include "fit/unheard.h"
 
 namespace unrig {
@@ -48,8 +50,12 @@ void settle_steps(Arrival& arrival) {
 }
 
 /// Noise, motion, and what the data cannot determine: each looked at again once the model fits.
-ParameterUncertainty settle(Arrival& arrival, const FitProblem& problem, bool steps) {
+ParameterUncertainty settle(Arrival& arrival, const FitProblem& problem, bool steps, std::vector<std::string>& warnings) {
   refine(arrival, problem);
+  if (const std::string warning = no_worse_than_start(arrival, problem); !warning.empty()) {
+    warnings.push_back(warning);
+    refine(arrival, problem);
+  }
   if (steps && problem.effects.empty()) look_elsewhere(arrival);
   if (steps) settle_steps(arrival);
   ParameterUncertainty uncertainty = estimate_uncertainty(arrival.joint);
@@ -100,7 +106,7 @@ FitResult describe_fit(Arrival& arrival, const FitProblem& problem, Settle first
   result.warnings = problem.rig.warnings;
   for (const Run& run : problem.runs) result.warnings.insert(result.warnings.end(), run.warnings.begin(), run.warnings.end());
   for (RunResidual& run : arrival.joint.runs()) run.temper(1);
-  const ParameterUncertainty uncertainty = first == Settle::nothing ? estimate_uncertainty(arrival.joint) : settle(arrival, problem, first == Settle::steps);
+  const ParameterUncertainty uncertainty = first == Settle::nothing ? estimate_uncertainty(arrival.joint) : settle(arrival, problem, first == Settle::steps, result.warnings);
   result.normal_modes = arrival.model->basis().normal_modes;
   result.torsion_modes = arrival.model->basis().torsion_modes;
   result.evaluations = arrival.evaluations;
@@ -121,6 +127,7 @@ FitResult describe_fit(Arrival& arrival, const FitProblem& problem, Settle first
   describe_parameters(joint, uncertainty, problem.start, result);
   describe_profiles(joint, uncertainty, problem, result);
   judge_answer(result);
+  refuse_unfitted_modes(joint, result);
   warn_of_mismatch(result);
   return result;
 }
