@@ -138,6 +138,25 @@ class Rows {
   DualMatrix dual;
 };
 
+/// Adds what mode i of a rig known as modes does to a sensor that moves by `shape` per unit of the modal displacement. `state`: rows of the state equation, rates of n modes behind their displacements.
+void add_modal_sensor(SensorKind reads, double shape, Index channel, Index i, const DualMatrix& state, DualMatrix& output) {
+  const Index n = state.rows() / 2;
+  switch (reads) {
+    case SensorKind::displacement:
+    case SensorKind::twist: output.value(channel, i) += shape; return;
+    case SensorKind::velocity:
+    case SensorKind::twist_rate: output.value(channel, n + i) += shape; return;
+    case SensorKind::acceleration: break;
+  }
+  output.value.row(channel) += shape * state.value.row(n + i);
+  for (Index j = 0; j < state.parameters(); ++j) {
+    if (!state.depends_on(j) || state.d(j).row(n + i).isZero(0)) continue;
+    MatrixXd slope = MatrixXd::Zero(output.rows(), output.cols());
+    slope.row(channel) = shape * state.d(j).row(n + i);
+    output.add_partial(j, slope);
+  }
+}
+
 /// Of the inputs that a system with ports has, only those the run records, and what the feedback drives.
 void keep_inputs(LinearSystem& system, const Conditions& conditions) {
   std::vector<Index> kept;
@@ -424,7 +443,18 @@ LinearSystem AeroelasticModel::modal_system(const Conditions& conditions, const 
     if (layout.force >= 0) set(layout.states + layout.force, 1, -1, 0);
     if (layout.mount >= 0) set(layout.states + layout.mount + 1, -participation, first + 3, -1);
     if (layout.coordinate_port >= 0) set(layout.states + layout.coordinate_port + i, 1, -1, 0);
-    for (Index c = 0; c < output.rows(); ++c) output.value(c, i) = rig_.modal[static_cast<std::size_t>(i)].gauge_gain;
+  }
+  for (Index c = 0; c < output.rows(); ++c) {
+    const auto sensor = std::find_if(rig_.sensors.begin(), rig_.sensors.end(), [&](const Sensor& s) { return s.column == channels[static_cast<std::size_t>(c)]; });
+    for (Index i = 0; i < n; ++i) {
+      const ModalMode& mode = rig_.modal[static_cast<std::size_t>(i)];
+      if (sensor == rig_.sensors.end()) output.value(c, i) = mode.gauge_gain;
+      else add_modal_sensor(sensor->reads, sensor->gain * mode.sensor_shape[static_cast<std::size_t>(sensor - rig_.sensors.begin())], c, i, state, output);
+    }
+    // Rates and accelerations are against the ground: the mount carries the sensor along. It does not turn.
+    if (sensor == rig_.sensors.end() || layout.mount < 0) continue;
+    if (sensor->reads == SensorKind::velocity) output.value(c, layout.states + layout.mount) += sensor->gain;
+    if (sensor->reads == SensorKind::acceleration) output.value(c, layout.states + layout.mount + 1) += sensor->gain;
   }
   LinearSystem system;
   system.A = state.block(0, 0, layout.states, layout.states);

@@ -137,14 +137,17 @@ void take_sensor_gain(const TomlTable& table, Sensor& sensor) {
   if (sensor.gain == 0) table.fail("gain", fmt::format("{} is 0", table.full_name("gain")), "wanted a gain that is not zero");
 }
 
-void take_sensors(const TomlTable& file, Rig& rig) {
+/// Sensors of a rig of elements say at which; a rig known only as modes says it mode by mode (`sensor_shape`).
+void take_sensors(const TomlTable& file, Rig& rig, bool of_elements) {
   for (const TomlTable& table : file.tables("sensor")) {
+    if (!of_elements && table.has("element"))
+      table.fail("element", fmt::format("{} stands beside [[modal]], which has no elements", table.full_name("element")), "wanted where the sensor sits as sensor_shape of each [[modal]]");
     table.allow_only({"column", "reads", "element", "gain"});
     Sensor sensor;
     sensor.column = table.text("column");
     sensor.reads = sensor_kind(table);
     const bool turns = sensor.reads == SensorKind::twist || sensor.reads == SensorKind::twist_rate;
-    sensor.element = element_number(table, "element", turns ? rig.torsion.inertia.size() : rig.station.size());
+    if (of_elements) sensor.element = element_number(table, "element", turns ? rig.torsion.inertia.size() : rig.station.size());
     take_sensor_gain(table, sensor);
     const auto same = [&sensor](const Sensor& other) { return other.column == sensor.column; };
     if (std::any_of(rig.sensors.begin(), rig.sensors.end(), same)) {
@@ -160,7 +163,7 @@ void take_structure(const TomlTable& file, Rig& rig) {
   take_chains(file, rig);
   take_submerged(file.table("submerged"), rig);
   if (file.has("gauge")) take_gauge(file.table("gauge"), rig);
-  if (file.has("sensor")) take_sensors(file, rig);
+  if (file.has("sensor")) take_sensors(file, rig, true);
   if (rig.gauge_element == 0 && rig.sensors.empty()) {
     throw InputError({rig.file, 0}, "the rig has neither [gauge] nor [[sensor]]", "wanted something that measures", "");
   }
@@ -180,8 +183,23 @@ void take_gauge_gain(const TomlTable& table, ModalMode& mode) {
   if (mode.gauge_gain == 0) table.fail("gauge_gain", fmt::format("{} is 0", name), "wanted a gain that is not zero");
 }
 
-ModalMode read_mode(const TomlTable& table) {
-  table.allow_only({"mass", "frequency", "damping_ratio", "gauge_gain", "mass_std", "mass_std_percent", "frequency_std", "frequency_std_percent", "damping_ratio_std",
+/// How the mode moves each sensor, per unit of the modal displacement.
+void take_sensor_shape(const TomlTable& table, std::size_t sensors, ModalMode& mode) {
+  const std::string name = table.full_name("sensor_shape");
+  if (sensors == 0) {
+    if (table.has("sensor_shape")) table.fail("sensor_shape", fmt::format("{} in a rig without [[sensor]]", name), "wanted a [[sensor]] for each of its numbers");
+    return;
+  }
+  if (!table.has("sensor_shape"))
+    table.fail("sensor_shape", fmt::format("{} is missing", name), fmt::format("wanted {} number{}, one per [[sensor]]: what it moves by per unit of the modal displacement", sensors, sensors > 1 ? "s" : ""));
+  mode.sensor_shape = table.numbers("sensor_shape");
+  if (mode.sensor_shape.size() != sensors)
+    table.fail("sensor_shape", fmt::format("{} has {} numbers", name, mode.sensor_shape.size()), fmt::format("wanted {}, one per [[sensor]] in their order", sensors));
+}
+
+/// A mode of a rig with so many sensors.
+ModalMode read_mode(const TomlTable& table, std::size_t sensors) {
+  table.allow_only({"mass", "frequency", "damping_ratio", "gauge_gain", "sensor_shape", "mass_std", "mass_std_percent", "frequency_std", "frequency_std_percent", "damping_ratio_std",
                     "damping_ratio_std_percent", "gauge_gain_std", "gauge_gain_std_percent"});
   ModalMode mode;
   mode.mass = table.positive_quantity("mass", "kg");
@@ -191,19 +209,36 @@ ModalMode read_mode(const TomlTable& table) {
     table.fail("damping_ratio", fmt::format("{} is {}", table.full_name("damping_ratio"), mode.damping_ratio),
                "wanted a fraction of critical damping, at least 0 and below 1");
   }
-  take_gauge_gain(table, mode);
+  take_sensor_shape(table, sensors, mode);
+  if (sensors > 0 && !table.has("gauge_gain"))
+    mode.gauge_gain = 0;  // no gauge
+  else
+    take_gauge_gain(table, mode);
   return mode;
 }
 
+/// What no mode moves measures nothing.
+void check_sensors_move(const TomlTable& file, const Rig& rig) {
+  for (std::size_t s = 0; s < rig.sensors.size(); ++s) {
+    if (std::any_of(rig.modal.begin(), rig.modal.end(), [s](const ModalMode& mode) { return mode.sensor_shape[s] != 0; })) continue;
+    file.fail("modal", fmt::format("number {} of sensor_shape is 0 in every mode", s + 1), fmt::format("wanted one mode at least that moves the sensor \"{}\"", rig.sensors[s].column));
+  }
+}
+
 void take_modes(const TomlTable& file, Rig& rig) {
-  for (const char* key : {"section", "normal", "torsion", "submerged", "gauge", "sensor"}) {
+  for (const char* key : {"section", "normal", "torsion", "submerged", "gauge"}) {
     if (file.has(key)) {
       file.fail(key, fmt::format("[{}] stands beside [[modal]]", key), "wanted either a rig of elements or a rig known only as modes");
     }
   }
-  file.allow_only({"unrig_rig", "name", "modal"});
+  file.allow_only({"unrig_rig", "name", "modal", "sensor"});
+  if (file.has("sensor")) take_sensors(file, rig, false);
   for (const TomlTable& table : file.tables("modal")) {
-    rig.modal.push_back(read_mode(table));
+    rig.modal.push_back(read_mode(table, rig.sensors.size()));
+    const auto has_gauge = [](const ModalMode& mode) { return mode.gauge_gain != 0; };
+    if (has_gauge(rig.modal.back()) != has_gauge(rig.modal.front()))
+      table.fail("gauge_gain", fmt::format("{} is {}, that of the first mode is {}", table.full_name("gauge_gain"), has_gauge(rig.modal.back()) ? "given" : "missing", has_gauge(rig.modal.front()) ? "given" : "missing"),
+                 "wanted a gauge_gain in every mode, or in none where there is no gauge");
     if (rig.modal.back().gauge_unit != rig.modal.front().gauge_unit) {
       table.fail(
           "gauge_gain",
@@ -211,6 +246,7 @@ void take_modes(const TomlTable& file, Rig& rig) {
           "wanted one unit of the reading");
     }
   }
+  check_sensors_move(file, rig);
 }
 
 }  // namespace

@@ -83,8 +83,9 @@ Conditions conditions_of(const Run& run) {
 std::vector<std::string> AeroelasticModel::output_channels(const Run& run) const {
   check_kind(run, rig_);
   std::vector<std::string> channels;
-  if ((rig_.is_modal() || rig_.gauge_element > 0) && run.find("gauge")) channels.emplace_back("gauge");
-  std::string wanted = channels.empty() && (rig_.is_modal() || rig_.gauge_element > 0) ? "a column 'gauge'" : "";
+  const bool has_gauge = rig_.is_modal() ? rig_.modal.front().gauge_gain != 0 : rig_.gauge_element > 0;
+  if (has_gauge && run.find("gauge")) channels.emplace_back("gauge");
+  std::string wanted = channels.empty() && has_gauge ? "a column 'gauge'" : "";
   for (const Sensor& sensor : rig_.sensors) {
     if (run.find(sensor.column)) {
       check_sensor_unit(run, sensor, rig_);

@@ -33,7 +33,7 @@ struct Output {
 /// The gauge and every sensor, whether the run has recorded them or not.
 std::vector<Output> outputs_of(const Rig& rig, const Run& run) {
   std::vector<Output> outputs;
-  if (rig.is_modal()) return {{"gauge", rig.modal.front().gauge_unit}};
+  if (rig.is_modal() && rig.modal.front().gauge_gain != 0) outputs.push_back({"gauge", rig.modal.front().gauge_unit});
   if (rig.gauge_element > 0) outputs.push_back({"gauge", "N"});
   for (const Sensor& sensor : rig.sensors) {
     const Channel* recorded = run.find(sensor.column);

@@ -12,7 +12,9 @@
 #include "core/in_parallel.h"
 #include "core/spectrum.h"
 #include "fit/first_guess.h"
+#include "fit/modal_start.h"
 #include "fit/mode_order.h"
+#include "fit/readings_noise.h"
 #include "fit/undetermined.h"
 
 namespace unrig {
@@ -122,6 +124,35 @@ Arrival grow(Arrival start, const FitProblem& problem, const ArrivalEffort& effo
   if (!effort.other_starts || horizons.size() < 2 || arrival.reduced_chi2() < followed_chi2) return arrival;
   Arrival other = try_other_starts(start, problem, horizons, effort);
   return other.reduced_chi2() < arrival.reduced_chi2() ? other : arrival;
+}
+
+/// Whether the fit follows its runs to their noise, that of measured inputs included.
+bool follows(Arrival arrival) {
+  for (std::size_t r = 0; r < arrival.joint.runs().size(); ++r) arrival.joint.runs()[r].settle_noise(arrival.joint.theta(r));
+  return arrival.reduced_chi2() < followed_chi2;
+}
+
+/// Of a rig known as modes: over the whole record at once, from the first guess and from the recordings' spectra. A window that grows may lose a mode that is near where it should be:
+/// it grows only where neither follows the runs.
+Arrival arrive_at_modes(const Arrival& start, const FitProblem& problem, const ArrivalEffort& effort) {
+  JointProblem::SolveOptions options;
+  options.iterations = effort.iterations;
+  options.precision = effort.precision;
+  options.most_evaluations = effort.evaluations;
+  std::optional<Arrival> best;
+  for (const bool from_spectra : {false, true}) {
+    Arrival other = start;
+    other.joint = make_joint(*start.model, problem.runs, start.windows, 0);
+    carry_over(start.joint, other.joint);
+    hold_undetermined(other.joint);
+    if (from_spectra && !start_modes_from_spectra(other.joint)) continue;
+    tell(problem, from_spectra ? "fitting from the lines of the spectra" : "fitting from the rig file's modes");
+    solve(other, options);
+    if (!best || other.joint.chi2() < best->joint.chi2()) best = std::move(other);
+  }
+  if (follows(*best)) return *best;
+  Arrival grown = grow(start, problem, effort);
+  return grown.joint.chi2() < best->joint.chi2() ? grown : *best;
 }
 
 void set_starts(JointProblem& joint, const std::map<std::string, double>& starts) {
@@ -318,7 +349,8 @@ void solve(Arrival& arrival, const JointProblem::SolveOptions& options) {
 Arrival arrive(const FitProblem& problem, const std::shared_ptr<const AeroelasticModel>& model, const ArrivalEffort& effort) {
   Windows windows;
   for (const Run& run : problem.runs) windows.push_back(problem.rig.is_modal() ? std::vector<MotionBasis::Window>{} : motion_windows(run));
-  Arrival arrival = grow(first_guess(problem, model, windows, problem.start), problem, effort);
+  const Arrival start = first_guess(problem, model, windows, problem.start);
+  Arrival arrival = problem.rig.is_modal() ? arrive_at_modes(start, problem, effort) : grow(start, problem, effort);
   hold_undetermined(arrival.joint);
   Arrival renumbered = arrival;
   if (!number_modes_by_frequency(renumbered.joint)) return arrival;
@@ -397,6 +429,18 @@ void refine(Arrival& arrival, const FitProblem& problem) {
     tell(problem, "refining the motion");
     solve(arrival);  // the first time for the noise levels' sake
     if (!changed) break;
+  }
+  // Noise of the inputs comes out as the model has it, which the last search has moved.
+  const bool noisy_inputs = std::any_of(joint.runs().begin(), joint.runs().end(), [](const RunResidual& run) { return !run.is_aside() && sigma_of_inputs(run, 0) > 0; });
+  constexpr double hardly = 1e-3;
+  double before = joint.chi2();
+  for (int round = 0; noisy_inputs && round < rounds; ++round) {
+    for (std::size_t r = 0; r < joint.runs().size(); ++r)
+      if (!joint.runs()[r].is_aside()) joint.runs()[r].settle_noise(joint.theta(r));
+    solve(arrival);
+    const double now = joint.chi2();
+    if (std::abs(now - before) < hardly * now) break;
+    before = now;
   }
 }
 

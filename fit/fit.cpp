@@ -15,10 +15,12 @@
 #include "fit/fit_description.h"
 #include "fit/gauss_newton.h"
 #include "fit/inexact_rig.h"
+#include "fit/no_worse_than_start.h"
 #include "fit/out_of_proportion.h"
 #include "fit/run_order.h"
 #include "fit/uncertainty.h"
 #include "fit/undetermined.h"
+#include "fit/unfitted_modes.h"
 #include "fit/unheard.h"
 
 namespace unrig {
@@ -54,8 +56,12 @@ void settle_steps(Arrival& arrival) {
 }
 
 /// Noise, motion, and what the data cannot determine: each looked at again once the model fits.
-ParameterUncertainty settle(Arrival& arrival, const FitProblem& problem, bool steps) {
+ParameterUncertainty settle(Arrival& arrival, const FitProblem& problem, bool steps, std::vector<std::string>& warnings) {
   refine(arrival, problem);
+  if (const std::string warning = no_worse_than_start(arrival, problem); !warning.empty()) {
+    warnings.push_back(warning);
+    refine(arrival, problem);
+  }
   if (steps && problem.effects.empty()) look_elsewhere(arrival);
   if (steps) settle_steps(arrival);
   ParameterUncertainty uncertainty = estimate_uncertainty(arrival.joint);
@@ -107,7 +113,7 @@ FitResult describe_fit(Arrival& arrival, const FitProblem& problem, Settle first
   result.warnings = problem.rig.warnings;
   for (const Run& run : problem.runs) result.warnings.insert(result.warnings.end(), run.warnings.begin(), run.warnings.end());
   for (RunResidual& run : arrival.joint.runs()) run.temper(1);
-  ParameterUncertainty uncertainty = first == Settle::nothing ? estimate_uncertainty(arrival.joint) : settle(arrival, problem, first == Settle::steps);
+  ParameterUncertainty uncertainty = first == Settle::nothing ? estimate_uncertainty(arrival.joint) : settle(arrival, problem, first == Settle::steps, result.warnings);
   InexactUncertainty with_numbers;
   if (inexact) {
     inexact->search(arrival);
@@ -139,6 +145,7 @@ FitResult describe_fit(Arrival& arrival, const FitProblem& problem, Settle first
   }
   describe_profiles(joint, uncertainty, problem, result);
   judge_answer(result);
+  refuse_unfitted_modes(joint, result);
   warn_of_silent_runs(joint, result);
   warn_of_mismatch(result);
   for (const std::string& warning : out_of_proportion(result.parameters)) result.warnings.push_back(warning);

@@ -13,6 +13,7 @@
 #include "core/gauge_lever.h"
 #include "fit/coloured_noise.h"
 #include "fit/explained.h"
+#include "fit/readings_noise.h"
 #include "fit/share_followed.h"
 
 namespace unrig {
@@ -125,7 +126,7 @@ FittedRun describe_run(const RunResidual& residual, const VectorXd& theta, doubl
   };
   for (std::size_t c = 0; c < p.channels.size(); ++c) {
     const VectorXd predicted = p.output.col(static_cast<Index>(c));
-    add(p.channels[c], predicted, residual.channel_weight(c), residual.sigma(c));
+    add(p.channels[c], predicted, residual.channel_weight(c), std::hypot(residual.sigma(c), sigma_of_inputs(residual, c)));
     fitted.followed = std::min(fitted.followed, share_followed(run.channel(p.channels[c]).value, predicted, residual.channel_weight(c)));
   }
   if (p.motion.angle.size() > 0) {

@@ -8,6 +8,7 @@
 
 #include "core/effects/effect.h"
 #include "core/in_parallel.h"
+#include "fit/modal_frequencies.h"
 
 namespace unrig {
 namespace {
@@ -66,6 +67,7 @@ VectorXd JointProblem::theta(std::size_t run) const {
 LeastSquaresProblem JointProblem::least_squares() const {
   LeastSquaresProblem problem;
   problem.least_variance = 1;
+  const double highest = highest_nyquist(runs_), nyquist = runs_.empty() || moves_above(*this, theta(0), highest) ? std::numeric_limits<double>::infinity() : highest;
   for (const Unknown& u : unknowns_) {
     const auto [lower, upper] = bounds_at(*model_, u.parameter, u.value);
     problem.unknowns.push_back({name(u), u.value, lower, upper, u.held, 0});
@@ -80,9 +82,10 @@ LeastSquaresProblem JointProblem::least_squares() const {
       parameters.push_back(unknowns_[i].parameter);
     }
     term.size = static_cast<Index>(model_->parameters().size()) + 1;
-    term.evaluate = [&run = runs_[r], theta = model_->start_values(), parameters, last = RunResidual::Solution()](
+    term.evaluate = [this, nyquist, &run = runs_[r], theta = model_->start_values(), parameters, last = RunResidual::Solution()](
                         const VectorXd& values, VectorXd& residual, MatrixXd* jacobian) mutable {
       theta(parameters) = values;
+      if (moves_above(*this, theta, nyquist)) return false;
       if (last.theta.size() == 0 || last.theta != theta) last = run.solve(theta);
       if (!std::isfinite(last.chi2)) return false;  // an unstable model
       if (jacobian == nullptr) {

@@ -25,6 +25,12 @@ std::vector<Mode> modes_of(JointProblem& joint) {
   return modes;
 }
 
+/// What mode a reads over what mode b does, per unit of their displacements: of the gauge, of a rig without one of the first sensor.
+double reading_ratio(const ModalMode& a, const ModalMode& b) {
+  if (a.gauge_gain != 0 || a.sensor_shape.empty()) return a.gauge_gain / b.gauge_gain;
+  return a.sensor_shape.front() / b.sensor_shape.front();
+}
+
 /// Numbers from 0, by rising `key`.
 template <class Key>
 std::vector<std::size_t> order_by(std::size_t count, Key key) {
@@ -49,7 +55,7 @@ bool number_modes_by_frequency(JointProblem& joint) {
   std::vector<Values> next(rig.size());
   for (std::size_t k = 0; k < rig.size(); ++k) {
     const std::size_t a = wanted[k], b = found[k];
-    const double gain = rig[a].gauge_gain / rig[b].gauge_gain, scale = modes[a].mass->held ? modes[a].mass->value / modes[b].mass->value : gain;
+    const double gain = reading_ratio(rig[a], rig[b]), scale = modes[a].mass->held ? modes[a].mass->value / modes[b].mass->value : gain;
     if (!(gain > 0) || !std::isfinite(scale)) return false;
     next[a] = {scale * modes[b].mass->value, scale * modes[b].stiffness->value, scale * modes[b].damping->value, scale / gain * modes[b].participation->value};
   }

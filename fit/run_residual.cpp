@@ -262,6 +262,7 @@ void RunResidual::set_motion_prior(const MatrixXd& rows) {
 void RunResidual::keep_noise_of(const RunResidual& other) {
   sigma_ = other.sigma_;
   weight_ = other.weight_;
+  Linearised::keep_input_noise(*this, other);
   angle_sigma_ = other.angle_sigma_;
   angle_ = other.angle_;
   angle_weight_ = other.angle_weight_;
@@ -312,6 +313,7 @@ void RunResidual::settle_noise(const VectorXd& theta) {
     settle(channels_[c], measured_.col(column) - p.output.col(column), weight_.col(column), sigma_[c]);
   }
   if (angle_offset_ >= 0) settle("alpha", angle_ - p.motion.angle - VectorXd::Constant(angle_.size(), p.angle_offset[0]), angle_weight_, angle_sigma_);
+  if (p.output.allFinite()) Linearised::settle_input_noise(*this, theta, measured_ - p.output);
   weights_changed();
 }
 

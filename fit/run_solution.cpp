@@ -215,6 +215,13 @@ const rest_rows::SmoothReadings& RunResidual::smooth_readings(Index channel, con
 /// All rows [c | y], those of phases at rest rotated and cut to what c can reach; solves for c. What the state that the run arrived in does lies in the span of the free response: it is taken
 /// from the readings behind the rotations.
 void RunResidual::stack_rows(Linearised& lin) const {
+  if (Linearised::input_noise(*this)) {
+    MatrixXd from = MatrixXd::Zero(lin.system.states(), unknowns_);
+    for (std::size_t i = 0; i < free_.size(); ++i) from(free_[i], first_state_ + static_cast<Index>(i)) = 1;
+    lin.settle_white(*this, from, free_response_rows(lin.system, lin.step, last_sample_), measured_.topRows(last_sample_) - lin.known.topRows(last_sample_));
+    lin.end = power(lin.step.transition.value, last_sample_) * from;
+    return;
+  }
   std::vector<MatrixXd> rows;
   double unreachable = 0;
   MatrixXd start = MatrixXd::Zero(lin.system.states(), unknowns_ + arrival_.cols());
@@ -371,12 +378,20 @@ RunResidual::Evaluation RunResidual::differentiate(const Solution& solution) con
   const Linearised& lin = *solution.model;
   const auto parameters = static_cast<Index>(model_->parameters().size());
   if (!std::isfinite(solution.chi2)) return says_nothing(parameters, unknowns_);
-  std::vector<run_rows::Rotated> rotated_blocks(lin.blocks.size());
+  const bool coloured = Linearised::input_noise(*this) != nullptr;
+  std::vector<run_rows::Rotated> rotated_blocks(coloured ? 0 : lin.blocks.size());
   double beside = 0;
-  DualMatrix departure = follow_partials(solution.theta, solution.linear, lin.blocks, [&](std::size_t b, const Interval& s, MatrixXd m) {
+  MatrixXd whole = MatrixXd::Zero(coloured ? last_sample_ * measured_.cols() : 0, parameters + 1);
+  DualMatrix departure = follow_partials(solution.theta, solution.linear, coloured ? std::vector<run_rows::Block>{} : lin.blocks, [&](std::size_t b, const Interval& s, MatrixXd m) {
     // Residual and its derivative, weighted: [-d y / d theta | measured - y].
-    const run_rows::Block& block = lin.blocks[b];
     m = -m;
+    if (coloured) {
+      const Index c = static_cast<Index>(b) % measured_.cols();
+      m.col(parameters) += measured_.col(c).segment(s.first, s.length());
+      whole.middleRows(c * last_sample_ + s.first, s.length()) = m;
+      return;
+    }
+    const run_rows::Block& block = lin.blocks[b];
     if (block.is_smooth(s)) {
       const rest_rows::SmoothReadings& readings = smooth_readings(block.channel, s);
       m = readings.weight * m;
@@ -389,7 +404,8 @@ RunResidual::Evaluation RunResidual::differentiate(const Solution& solution) con
     block.rotate(s, std::move(m), rotated_blocks[b]);
   });
   std::vector<MatrixXd> reached, others{std::sqrt(beside) * RowVectorXd::Unit(parameters + 1, parameters)};
-  for (std::size_t b = 0; b < lin.blocks.size(); ++b) {
+  if (coloured) reached.push_back(Linearised::white(*this, whole));
+  for (std::size_t b = 0; b < rotated_blocks.size(); ++b) {
     reached.push_back(lin.blocks[b].reached(rotated_blocks[b]));
     others.insert(others.end(), rotated_blocks[b].others.begin(), rotated_blocks[b].others.end());
   }

@@ -8,13 +8,33 @@
 
 #include <fmt/format.h>
 
+#include "fit/modal_frequencies.h"
+
 namespace unrig {
 using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
+/// A mode of the rig file above half of every run's sampling rate stays what the file says.
+void hold_modes_above_nyquist(JointProblem& joint, MatrixXd& jacobian) {
+  const AeroelasticModel& model = joint.model();
+  const double nyquist = highest_nyquist(joint.runs());
+  for (std::size_t i = 0; i < model.rig().modal.size(); ++i) {
+    if (modal_frequency(model, joint.theta(0), i) < nyquist) continue;
+    const ModalPlace place = place_of_mode(model, i);
+    for (std::size_t k = 0; k < joint.unknowns().size(); ++k) {
+      Unknown& u = joint.unknowns()[k];
+      if (u.parameter != place.mass && u.parameter != place.stiffness && u.parameter != place.damping && u.parameter != place.participation) continue;
+      jacobian.col(static_cast<Index>(k)).setZero();
+      u.why_held = fmt::format("Its mode lies above half the sampling rate of these runs, {:.4g} Hz", nyquist);
+    }
+  }
+}
+
 void hold_undetermined(JointProblem& joint) {
-  const MatrixXd jacobian = joint.linearise().jacobian;
+  for (Unknown& u : joint.unknowns()) u.why_held.clear();
+  MatrixXd jacobian = joint.linearise().jacobian;
+  hold_modes_above_nyquist(joint, jacobian);
   std::vector<Index> order(joint.unknowns().size());
   for (std::size_t i = 0; i < order.size(); ++i) order[i] = static_cast<Index>(i);
   const auto last_resort = [&](Index i) {
@@ -32,7 +52,7 @@ void hold_undetermined(JointProblem& joint) {
       for (const VectorXd& direction : span) rest -= direction.dot(rest) * direction;
     Unknown& unknown = joint.unknowns()[static_cast<std::size_t>(i)];
     unknown.held = !(length > 0) || rest.norm() < dependent * length;
-    if (unknown.held) unknown.why_held = length > 0 ? "These runs determine it only together with others" : "These runs do not respond to it";
+    if (unknown.held && unknown.why_held.empty()) unknown.why_held = length > 0 ? "These runs determine it only together with others" : "These runs do not respond to it";
     if (!unknown.held) span.push_back(rest.normalized());
   }
 }
