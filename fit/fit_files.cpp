@@ -11,6 +11,7 @@
 #include "core/effects/effect.h"
 #include "core/fingerprint.h"
 #include "core/given_files.h"
+#include "core/law/law_effect.h"
 #include "core/text_file.h"
 #include "fit/fit_json.h"
 
@@ -62,9 +63,26 @@ json number(double x) { return std::isfinite(x) ? json(x) : json(nullptr); }
 template <class Named>
 std::string label(const Named& p) { return p.run.empty() ? p.name : p.name + " (" + base_name(p.run) + ")"; }
 
+/// The laws at work, each with its whole file.
+json laws_at_work(const FitResult& r, const std::vector<std::shared_ptr<const Effect>>& laws) {
+  json list = json::array();
+  for (const std::string& id : r.effects) {
+    if (!is_law_id(id)) continue;
+    const auto found = std::find_if(laws.begin(), laws.end(), [&](const auto& law) { return law->id == id; });
+    if (found == laws.end()) throw std::invalid_argument(fmt::format("the fit has {} at work, which is not among the laws given", id));
+    const Law& law = law_of(**found);
+    json item = {{"effect", id}, {"name", law.name}, {"class", law.kind()}, {"acts_on", to_string(law.acts_on)}, {"force", law.force_text}};
+    if (law.memory) item["memory"] = law.memory_text;
+    item["file"] = law.file;
+    item["text"] = law.text;
+    list.push_back(item);
+  }
+  return list;
+}
+
 }  // namespace
 
-std::string to_json(const FitResult& r) {
+std::string to_json(const FitResult& r, const std::vector<std::shared_ptr<const Effect>>& laws) {
   json out;
   out["unrig"] = "fit";
   out["rig"] = r.rig_file;
@@ -81,6 +99,7 @@ std::string to_json(const FitResult& r) {
   out["modes"] = {{"normal", r.normal_modes}, {"torsion", r.torsion_modes}};
   out["standard_errors"] = r.coloured ? "from the residuals' own spectra (coloured)" : "white residuals, times sqrt(reduced chi-square) where that exceeds one";
   if (!r.effects.empty()) out["effects"] = r.effects;
+  if (const json at_work = laws_at_work(r, laws); !at_work.empty()) out["laws"] = at_work;
   if (r.law_steps > 1) out["law_steps"] = r.law_steps;
   out["parameters"] = json::array();
   for (const FittedParameter& p : r.parameters) {
@@ -153,7 +172,13 @@ FittedRig read_fit(const json& in, const std::string& path) {
       fit.torsion_modes = in["modes"].value("torsion", 0);
     }
     fit.effects = in.value("effects", std::vector<std::string>{});
-    for (const std::string& id : fit.effects) effect(id);  // refuses what this version does not know
+    Rig laws;
+    for (const json& item : in.value("laws", json::array())) add_law(laws, parse_law(item.at("text").get<std::string>(), path + ", law " + item.value("name", "")));
+    fit.laws = laws.laws;
+    for (const std::string& id : fit.effects) {
+      if (is_law_id(id) && std::none_of(fit.laws.begin(), fit.laws.end(), [&](const auto& law) { return law->id == id; })) throw refuse(fmt::format("the law \"{}\" at work, but not among the \"laws\"", id));
+      effect(laws, id);  // refuses what this version does not know
+    }
     fit.law_steps = in.value("law_steps", Eigen::Index{1});
     if (fit.law_steps < 1) throw refuse(fmt::format("\"law_steps\" of {}", fit.law_steps));
     for (const json& item : in.at("parameters")) {
@@ -185,6 +210,11 @@ FittedRig read_fit(const json& in, const std::string& path) {
   } catch (const std::invalid_argument& e) {
     throw refuse(e.what());
   }
+}
+
+Rig with_laws(Rig rig, const FittedRig& fit) {
+  rig.laws = fit.laws;
+  return rig;
 }
 
 bool FittedRig::had_other_readings(const Run& run) const {
