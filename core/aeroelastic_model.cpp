@@ -11,6 +11,7 @@
 
 #include "core/effects/effect.h"
 #include "core/gauge_lever.h"
+#include "core/law/law_effect.h"
 
 namespace unrig {
 namespace {
@@ -258,9 +259,9 @@ LinearSystem AeroelasticModel::system(const Conditions& conditions, const Vector
   LinearSystem system = rig_.is_modal() ? modal_system(with_ports, theta, channels) : beam_system(with_ports, theta, channels);
   const auto strips = static_cast<Index>(rig_.submerged.size());
   Index first = theta.size();
-  for (const std::string& id : effects_) first -= static_cast<Index>(effect(id).parameters_on(rig_).size());
+  for (const std::string& id : effects_) first -= static_cast<Index>(effect(rig_, id).parameters_on(rig_).size());
   for (const std::string& id : effects_) {
-    const Effect& e = effect(id);
+    const Effect& e = effect(rig_, id);
     const EffectContext context{*this, conditions, theta, first, gauge == channels.end() ? Index{-1} : gauge - channels.begin(), Ports{0, 1, 3, strips, 3 + strips, system.coordinates}};
     if (e.acts(rig_, conditions)) apply(e, system, context);
     first += static_cast<Index>(e.parameters_on(rig_).size());
@@ -273,10 +274,10 @@ LinearSystem AeroelasticModel::system(const Conditions& conditions, const Vector
 AeroelasticModel AeroelasticModel::with_effects(const std::vector<std::string>& ids) const {
   AeroelasticModel model = *this;
   for (const std::string& id : ids) {
-    const Needs needs = effect(id).needs;
+    const Needs needs = effect(rig_, id).needs;
     if (needs != Needs::any_rig && rig_.is_modal()) throw InputError({rig_.file, 0}, "a rig known only as modes", "wanted a beam rig, which the effect " + id + " needs", "Describe its section and chains, or leave the effect out.");
     if (!has(rig_, needs)) throw InputError({rig_.file, 0}, "no sensor of the twist", "wanted one, which the effect " + id + " needs", "Add a [[sensor]] with reads = \"twist\", or leave the effect out.");
-    for (Parameter p : effect(id).parameters_on(rig_)) {
+    for (Parameter p : effect(rig_, id).parameters_on(rig_)) {
       p.name = id + "." + p.name;
       model.parameters_.push_back(p);
     }

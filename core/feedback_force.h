@@ -5,8 +5,8 @@
 
 namespace unrig {
 
-constexpr int most_law_parameters = 8;  ///< of one feedback
-constexpr int most_law_arguments = 4;
+constexpr int most_law_parameters = 16;  ///< of one feedback
+constexpr int most_law_arguments = 10;
 
 /// f(z) of a feedback at the parameters in theta, and its derivatives.
 struct FeedbackForce {

@@ -14,12 +14,15 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-// A handful of feedbacks and of arguments, so that a step allocates nothing. M: how many there are of both, where that is known.
-constexpr int most_feedbacks = 16;
+// How many feedbacks and arguments there are: one of each, a handful of both, so that a step allocates nothing, or any number (a law on each of many strips).
+constexpr int one = 1, handful = Eigen::Dynamic, many = -2;
+constexpr int in_a_handful = 16;
+constexpr int rows_of(int M) { return M == one ? 1 : Eigen::Dynamic; }
+constexpr int most_rows_of(int M) { return M == one ? 1 : M == handful ? in_a_handful : Eigen::Dynamic; }
 template <int M>
-using Few = Eigen::Matrix<double, M, 1, 0, M == Eigen::Dynamic ? most_feedbacks : M, 1>;
+using Few = Eigen::Matrix<double, rows_of(M), 1, 0, most_rows_of(M), 1>;
 template <int M>
-using FewSquare = Eigen::Matrix<double, M, M, 0, M == Eigen::Dynamic ? most_feedbacks : M, M == Eigen::Dynamic ? most_feedbacks : M>;
+using FewSquare = Eigen::Matrix<double, rows_of(M), rows_of(M), 0, most_rows_of(M), most_rows_of(M)>;
 
 /// The laws of all feedbacks at one sample.
 template <int M>
@@ -58,7 +61,7 @@ class Laws {
 
 template <int M>
 Few<M> solve_few(const FewSquare<M>& matrix, const Few<M>& right) {
-  if constexpr (M == 1)
+  if constexpr (M == one)
     return right / matrix(0, 0);
   else
     return matrix.partialPivLu().solve(right);
@@ -327,7 +330,7 @@ class Follower {
 
   /// Of each feedback the sum over its arguments.
   Few<M> of_feedbacks(const Few<M>& by_argument) const {
-    if constexpr (M == 1) return by_argument;
+    if constexpr (M == one) return by_argument;
     Few<M> sum = Few<M>::Zero(one_.feedbacks);
     for (Index a = 0; a < by_argument.size(); ++a) sum[arguments_.owner[static_cast<std::size_t>(a)]] += by_argument[a];
     return sum;
@@ -339,7 +342,7 @@ class Follower {
   }
 
   static FewSquare<M> inverse(const FewSquare<M>& matrix) {
-    if constexpr (M == 1)
+    if constexpr (M == one)
       return matrix.cwiseInverse();
     else
       return matrix.partialPivLu().inverse();
@@ -369,8 +372,12 @@ class Follower {
 ExactStep step_to_follow(const LinearSystem& system, double dt) { return exact_step(system, dt / static_cast<double>(steps_per_sample(system))); }
 
 NonlinearResponse follow(const LinearSystem& system, const ExactStep& step, const VectorXd& theta, const NonlinearDrive& drive, Index samples, Partials partials) {
-  if (system.feedback.size() == 1 && system.feedback.front().sees.rows() == 1) return Follower<1>(system, step, theta, drive, samples, partials).run();
-  return Follower<Eigen::Dynamic>(system, step, theta, drive, samples, partials).run();
+  Index arguments = 0;
+  for (const Feedback& f : system.feedback) arguments += f.sees.rows();
+  const auto feedbacks = static_cast<Index>(system.feedback.size());
+  if (feedbacks == 1 && arguments == 1) return Follower<one>(system, step, theta, drive, samples, partials).run();
+  if (std::max(feedbacks, arguments) <= in_a_handful) return Follower<handful>(system, step, theta, drive, samples, partials).run();
+  return Follower<many>(system, step, theta, drive, samples, partials).run();
 }
 
 }  // namespace unrig

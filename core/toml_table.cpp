@@ -63,6 +63,12 @@ void TomlTable::allow_only(std::initializer_list<std::string_view> keys) const {
   }
 }
 
+std::vector<std::string> TomlTable::keys() const {
+  std::vector<std::string> all;
+  for (const auto& [key, value] : *table_) all.emplace_back(key.str());
+  return all;
+}
+
 bool TomlTable::has_text(std::string_view key) const {
   const toml::node* node = table_->get(key);
   return node && node->is_string();

@@ -26,6 +26,8 @@ class TomlTable {
   /// Throws for the first key that is not among `keys`.
   void allow_only(std::initializer_list<std::string_view> keys) const;
 
+  /// In alphabetical order.
+  std::vector<std::string> keys() const;
   bool has(std::string_view key) const { return table_->contains(key); }
   /// True where the key holds text ("6 in"), one value for all elements.
   bool has_text(std::string_view key) const;

@@ -12,6 +12,8 @@
 #include "core/effects/effect.h"
 #include "core/in_parallel.h"
 #include "core/indicial_table.h"
+#include "core/law/law_effect.h"
+#include "core/rigid_load.h"
 #include "core/run_inputs.h"
 #include "core/run_limits.h"
 #include "correct/how_far_to_trust.h"
@@ -58,7 +60,7 @@ void check(const CorrectProblem& problem) {
 /// The effects of the fit, but those that are part of the load: the free build-up of circulation stands in their place.
 std::vector<std::string> effects_of_the_rig(const FittedRig& fit) {
   std::vector<std::string> ids;
-  std::copy_if(fit.effects.begin(), fit.effects.end(), std::back_inserter(ids), [](const std::string& id) { return !effect(id).in_the_load; });
+  std::copy_if(fit.effects.begin(), fit.effects.end(), std::back_inserter(ids), [rig = with_laws({}, fit)](const std::string& id) { return !effect(rig, id).in_the_load; });
   return ids;
 }
 
@@ -77,7 +79,7 @@ AeroelasticModel free_model(const CorrectProblem& problem, double semichords) {
   const VectorXd rates = spread_rates(beyond_the_record * semichords);
   const Basis basis = basis_of(problem);
   const AeroelasticModel model =
-      AeroelasticModel(problem.rig, basis, {"free", wagner_amplitudes(rates, semichords), rates}, AeroelasticModel::Circulation::free).with_effects(effects_of_the_rig(problem.fit));
+      AeroelasticModel(with_laws(problem.rig, problem.fit), basis, {"free", wagner_amplitudes(rates, semichords), rates}, AeroelasticModel::Circulation::free).with_effects(effects_of_the_rig(problem.fit));
   check_is_fit_of(model, problem.fit, run.file);
   return model;
 }

@@ -10,6 +10,7 @@
 
 #include "core/effects/effect.h"
 #include "core/in_parallel.h"
+#include "core/law/law_effect.h"
 #include "core/spectrum.h"
 #include "fit/first_guess.h"
 #include "fit/modal_start.h"
@@ -20,7 +21,7 @@
 namespace unrig {
 
 bool belongs_to_an_effect(const std::string& parameter) {
-  return std::any_of(effects().begin(), effects().end(), [&](const Effect& e) { return parameter.starts_with(e.id + "."); });
+  return is_law_id(parameter) || std::any_of(effects().begin(), effects().end(), [&](const Effect& e) { return parameter.starts_with(e.id + "."); });
 }
 namespace {
 
@@ -258,13 +259,13 @@ void choose_effect_starts(Arrival& arrival, const FitProblem& problem, const std
   JointProblem& judge = lost ? at_the_rig : arrival.joint;
   for (const std::string& id : added) {
     tell(problem, "looking for " + id);
-    const auto& parameters = effect(id).parameters_on(arrival.joint.model().rig());
+    const auto& parameters = effect(problem.rig, id).parameters_on(arrival.joint.model().rig());
     const auto set = [&](JointProblem& joint, const VectorXd& values) {
       for (Unknown* u : unknowns_of(joint, id))
         for (std::size_t k = 0; k < parameters.size(); ++k)
           if (joint.parameter(*u).name == id + "." + parameters[k].name) u->value = values[static_cast<Index>(k)];
     };
-    const std::vector<VectorXd> starts = starts_of(judge, effect(id));
+    const std::vector<VectorXd> starts = starts_of(judge, effect(problem.rig, id));
     const VectorXd* best = nullptr;
     double least = std::numeric_limits<double>::infinity();
     for (const VectorXd& start : starts) {

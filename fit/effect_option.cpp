@@ -7,6 +7,7 @@
 
 #include "core/effects/effect.h"
 #include "core/error.h"
+#include "core/law/law_effect.h"
 
 namespace unrig {
 namespace {
@@ -31,7 +32,7 @@ std::vector<std::string> effects_of_option(const std::string& option, const std:
 void refuse_idle(const std::string& option, const std::vector<std::string>& ids, const Rig& rig, const std::vector<Run>& runs) {
   const std::vector<Conditions> conditions = conditions_of_all(runs);
   for (const std::string& id : ids)
-    if (const std::string why = why_idle(effect(id), rig, conditions); !why.empty())
+    if (const std::string why = why_idle(effect(rig, id), rig, conditions); !why.empty())
       throw InputError({option, 0}, id + " can act in none of these runs", "wanted what it needs: " + why, "Leave it out, or give such a run.");
 }
 
@@ -39,6 +40,15 @@ std::vector<std::string> effects_that_act(const Rig& rig, const std::vector<Run>
   std::vector<std::string> ids;
   for (const Effect& e : effects())
     if (why_idle(e, rig, conditions_of_all(runs)).empty()) ids.push_back(e.id);
+  return ids;
+}
+
+std::vector<std::string> add_laws(Rig& rig, const std::vector<std::string>& paths) {
+  std::vector<std::string> ids;
+  for (const std::string& path : paths) {
+    add_law(rig, read_law(path));
+    ids.push_back(rig.laws.back()->id);
+  }
   return ids;
 }
 

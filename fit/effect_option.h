@@ -16,6 +16,9 @@ void refuse_idle(const std::string& option, const std::vector<std::string>& ids,
 /// All that can act in at least one of the runs, in the order of the table.
 std::vector<std::string> effects_that_act(const Rig& rig, const std::vector<Run>& runs);
 
+/// Reads law files (core/law/law.h) and puts them to the rig; their ids. Throws InputError for what is no law and for two of one name.
+std::vector<std::string> add_laws(Rig& rig, const std::vector<std::string>& paths);
+
 /// The names that may be given, and what each means, for a command's help.
 std::string effect_list();
 

@@ -8,6 +8,7 @@
 
 #include "core/effects/effect.h"
 #include "core/fingerprint.h"
+#include "core/law/law_effect.h"
 #include "fit/arrival.h"
 #include "fit/decays_first.h"
 #include "fit/effect_option.h"
@@ -95,7 +96,7 @@ AeroelasticModel model_of(const Rig& rig, const std::vector<Run>& runs, Wagner c
   const auto complete = [&](const AeroelasticModel& model) { return effects.empty() ? model : model.with_effects(effects); };
   if (rig.is_modal()) return complete({rig, {}, wagner(circulation)});
   Rig richer = rig;
-  if (std::any_of(effects.begin(), effects.end(), [](const std::string& id) { return effect(id).enriches_basis; })) richer.normal.modes = 0;
+  if (std::any_of(effects.begin(), effects.end(), [&](const std::string& id) { return effect(rig, id).enriches_basis; })) richer.normal.modes = 0;
   Basis basis;
   for (const Run& run : runs) {
     Basis wanted = make_basis(richer, 0.5 / run.dt, run.density);

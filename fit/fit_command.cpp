@@ -23,13 +23,14 @@ int fit_command(int argc, char** argv) {
   FitProblem problem;
   CLI::App app{"Fits stiffness, damping and apparent mass of a rig to recordings, all together.", "unrig fit"};
   std::string rig_path, output, circulation = "1e-4";
-  std::vector<std::string> run_paths, starts, effect_ids;
+  std::vector<std::string> run_paths, starts, effect_ids, law_paths;
   double least = 0.1;
   bool price = false;
   app.add_option("--rig", rig_path, "rig file (TOML)")->required();
   app.add_option("runs", run_paths, "run files (CSV): free decays and steps of this rig, one or more");
   app.add_option("-o,--output", output, "result (JSON)")->required();
   app.add_option("--effect", effect_ids, "physics beyond the rig model that is at work, one of those below (repeatable)")->allow_extra_args(false);
+  app.add_option("--law", law_paths, "file (TOML) with a law of your own that is at work (repeatable); the manual's laws.md says how it is written")->allow_extra_args(false);
   app.add_option("--start", starts, "start value of a parameter, NAME=VALUE (repeatable)")->allow_extra_args(false);
   CLI::Option* const profile = app.add_option("--profile", problem.profile, "profile-likelihood intervals (68 %, 95 %) of these parameters; without a name, of all that were fitted")->expected(0, -1);
   app.add_option("--wagner", circulation, "circulatory build-up: 1e-4, 1e-6 (largest error), jones, seed")->capture_default_str();
@@ -54,6 +55,7 @@ int fit_command(int argc, char** argv) {
 
   std::vector<std::string> inputs = run_paths;
   inputs.push_back(rig_path);
+  inputs.insert(inputs.end(), law_paths.begin(), law_paths.end());
   check_outputs({{"-o", output}}, inputs);
   check_given_once(run_paths);
   if (profile->count() > 0 && problem.profile.empty()) problem.profile = {"all"};
@@ -66,6 +68,8 @@ int fit_command(int argc, char** argv) {
   for (const std::string& path : run_paths) problem.runs.push_back(read_run(path));
   check_recorded_once(problem.runs, problem.rig);
   problem.effects = effects_of_option("--effect", effect_ids);
+  const std::vector<std::string> laws = add_laws(problem.rig, law_paths);
+  problem.effects.insert(problem.effects.end(), laws.begin(), laws.end());
   for (const std::string& start : starts) {
     const std::size_t equals = start.find('=');
     const char* text = start.c_str() + (equals == std::string::npos ? 0 : equals + 1);
@@ -83,7 +87,7 @@ int fit_command(int argc, char** argv) {
   result.command = made.command;
   progress.clear();
   for (const std::string& warning : result.warnings) warn(warning);
-  write_text(output, to_json(result));
+  write_text(output, to_json(result, problem.rig.laws));
   fmt::print("{}", report(result, least));
   if (price && result.no_answer.empty()) fmt::print("{}", result.givens.empty() ? report(price_of_numbers(problem, result)) : "The price: uncertainties are stated, and are in the errors above.\n");
   if (result.no_answer.empty()) return exit_done;

@@ -12,6 +12,7 @@
 #include "core/effects/effect.h"
 #include "core/fingerprint.h"
 #include "core/given_files.h"
+#include "core/law/law_effect.h"
 #include "core/text_file.h"
 #include "fit/fit_json.h"
 
@@ -110,9 +111,26 @@ std::string report_givens(const FitResult& r) {
   return text;
 }
 
+/// The laws at work, each with its whole file.
+json laws_at_work(const FitResult& r, const std::vector<std::shared_ptr<const Effect>>& laws) {
+  json list = json::array();
+  for (const std::string& id : r.effects) {
+    if (!is_law_id(id)) continue;
+    const auto found = std::find_if(laws.begin(), laws.end(), [&](const auto& law) { return law->id == id; });
+    if (found == laws.end()) throw std::invalid_argument(fmt::format("the fit has {} at work, which is not among the laws given", id));
+    const Law& law = law_of(**found);
+    json item = {{"effect", id}, {"name", law.name}, {"class", law.kind()}, {"acts_on", to_string(law.acts_on)}, {"force", law.force_text}};
+    if (law.memory) item["memory"] = law.memory_text;
+    item["file"] = law.file;
+    item["text"] = law.text;
+    list.push_back(item);
+  }
+  return list;
+}
+
 }  // namespace
 
-std::string to_json(const FitResult& r) {
+std::string to_json(const FitResult& r, const std::vector<std::shared_ptr<const Effect>>& laws) {
   json out;
   out["unrig"] = "fit";
   out["rig"] = r.rig_file;
@@ -132,6 +150,7 @@ std::string to_json(const FitResult& r) {
   out["modes"] = {{"normal", r.normal_modes}, {"torsion", r.torsion_modes}};
   out["standard_errors"] = r.coloured ? "from the residuals' own spectra (coloured)" : "white residuals, times sqrt(reduced chi-square) where that exceeds one";
   if (!r.effects.empty()) out["effects"] = r.effects;
+  if (const json at_work = laws_at_work(r, laws); !at_work.empty()) out["laws"] = at_work;
   if (r.law_steps > 1) out["law_steps"] = r.law_steps;
   out["parameters"] = json::array();
   for (const FittedParameter& p : r.parameters) {
@@ -207,7 +226,13 @@ FittedRig read_fit(const json& in, const std::string& path) {
       fit.torsion_modes = in["modes"].value("torsion", 0);
     }
     fit.effects = in.value("effects", std::vector<std::string>{});
-    for (const std::string& id : fit.effects) effect(id);  // refuses what this version does not know
+    Rig laws;
+    for (const json& item : in.value("laws", json::array())) add_law(laws, parse_law(item.at("text").get<std::string>(), path + ", law " + item.value("name", "")));
+    fit.laws = laws.laws;
+    for (const std::string& id : fit.effects) {
+      if (is_law_id(id) && std::none_of(fit.laws.begin(), fit.laws.end(), [&](const auto& law) { return law->id == id; })) throw refuse(fmt::format("the law \"{}\" at work, but not among the \"laws\"", id));
+      effect(laws, id);  // refuses what this version does not know
+    }
     fit.law_steps = in.value("law_steps", Eigen::Index{1});
     if (fit.law_steps < 1) throw refuse(fmt::format("\"law_steps\" of {}", fit.law_steps));
     for (const json& item : in.at("parameters")) {
@@ -247,6 +272,11 @@ FittedRig read_fit(const json& in, const std::string& path) {
   }
 }
 
+Rig with_laws(Rig rig, const FittedRig& fit) {
+  rig.laws = fit.laws;
+  return rig;
+}
+
 bool FittedRig::had_other_readings(const Run& run, const Rig& rig) const {
   const auto place = static_cast<std::size_t>(std::find(runs.begin(), runs.end(), recorded_as(run.file)) - runs.begin());
   if (place >= fingerprints.size() || fingerprints[place].empty()) return false;
@@ -267,6 +297,7 @@ std::string fingerprint(const FittedRig& fit) {
   };
   std::vector<std::string> items{fmt::format("circulation {} modes {} {} steps {} rig {}", name_of(fit.circulation), fit.normal_modes, fit.torsion_modes, fit.law_steps, fit.rig_fingerprint)};
   for (const std::string& id : fit.effects) items.push_back("effect " + id);
+  for (const auto& law : fit.laws) items.push_back("law " + law_of(*law).text);
   std::vector<std::string> names;
   for (const FittedParameter& p : fit.parameters) {
     names.push_back(p.name + " " + run_of(p));

@@ -1,13 +1,16 @@
 #pragma once
 #include <limits>
+#include <memory>
 #include <string>
+#include <vector>
 
 #include "fit/fit.h"
 
 namespace unrig {
 
-/// `fit.json` (correct/manual/results.md), with the circulation, the modes kept and the full correlation matrix.
-std::string to_json(const FitResult& result);
+/// `fit.json` (correct/manual/results.md), with the circulation, the modes kept and the full correlation matrix. `laws`: the fitted rig's, which the file then carries whole.
+/// Throws std::invalid_argument where a law at work is not among them.
+std::string to_json(const FitResult& result, const std::vector<std::shared_ptr<const Effect>>& laws = {});
 
 /// Parameters of a `fit.json`, as far as `simulate` and `correct` need them.
 struct FittedRig {
@@ -16,6 +19,7 @@ struct FittedRig {
   Wagner circulation = Wagner::within_1e4;
   Eigen::Index normal_modes = 0, torsion_modes = 0;
   std::vector<std::string> effects;  ///< at work in the fitted model
+  std::vector<std::shared_ptr<const Effect>> laws;  ///< those of the effects that a user wrote down
   Eigen::Index law_steps = 1;        ///< FitResult::law_steps
   std::vector<FittedParameter> parameters;
   Eigen::MatrixXd correlation;
@@ -39,6 +43,9 @@ struct FittedRig {
 
 /// Throws InputError where the file is not a fit.
 FittedRig read_fit(const std::string& path);
+
+/// The rig with the fit's laws, and no others.
+Rig with_laws(Rig rig, const FittedRig& fit);
 
 /// Sixteen digits that tell one fit from another: of its parameters and what they were fitted with, in whatever order its runs were given.
 std::string fingerprint(const FittedRig& fit);

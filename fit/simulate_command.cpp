@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <complex>
 #include <filesystem>
 #include <numbers>
@@ -13,6 +14,7 @@
 #include "core/fingerprint.h"
 #include "core/given_files.h"
 #include "core/indicial_table.h"
+#include "core/law/law_effect.h"
 #include "core/provenance.h"
 #include "core/run_text.h"
 #include "core/scan.h"
@@ -34,7 +36,7 @@ constexpr const char* steady_name = "steady_normal_force";
 struct Options {
   std::string rig, run, fit, output, circulation, indicial, release_load;
   Index normal_modes = 0, torsion_modes = 0;
-  std::vector<std::string> settings;
+  std::vector<std::string> settings, laws;
   bool jumps = false, as_recorded = false;
 };
 
@@ -92,6 +94,28 @@ void set(const std::string& setting, SimulateProblem& problem) {
     throw InputError(place, fmt::format("no parameter is called \"{}\"", name), "wanted one of: " + names, "");
 }
 
+/// The rig with the fit's laws and those of the command line; the effects at work.
+std::vector<std::string> put_laws(Rig& rig, const std::optional<FittedRig>& fit, const std::vector<std::string>& paths) {
+  std::vector<std::string> effects;
+  if (fit) {
+    effects = fit->effects;
+    rig = with_laws(std::move(rig), *fit);
+  }
+  for (const std::string& path : paths) {
+    const Law law = read_law(path);
+    const auto fitted = fit ? std::find_if(fit->laws.begin(), fit->laws.end(), [&](const auto& other) { return other->id == law.id(); }) : std::vector<std::shared_ptr<const Effect>>::const_iterator{};
+    if (fit && fitted != fit->laws.end()) {
+      if (!law.says_the_same_as(law_of(**fitted)))
+        throw InputError({path, 0}, fmt::format("the law \"{}\" is another than the one of this name in {}, {}", law.name, fit->file, (*fitted)->equation), "wanted the law that was fitted", "Leave --law out, since the fit carries its laws, or fit again.");
+      continue;
+    }
+    if (fit) warn(fmt::format("{}: the law \"{}\" had no part in {}; it acts with the start values of its file", path, law.name, fit->file));
+    add_law(rig, law);
+    effects.push_back(law.id());
+  }
+  return effects;
+}
+
 /// A measured angle is replaced by the motion that it says.
 void take_out_noise_of_the_angle(const Rig& rig, Run& run) {
   const std::optional<ShaftMotion> motion = shaft_motion(rig, run);
@@ -135,8 +159,9 @@ ToSimulate problem_of(const Options& options, const Provenance& made) {
   std::optional<TabulatedIndicial> table;
   if (!options.indicial.empty()) table = read_indicial(options.indicial);
 
+  const std::vector<std::string> effects = put_laws(rig, fit, options.laws);
   SimulateProblem problem{{rig, basis_of(rig, run, fit, options), circulation_of(options, fit, table)}, {}, std::move(run), {}, {}, {}};
-  if (fit && !fit->effects.empty()) problem.model = problem.model.with_effects(fit->effects);
+  if (!effects.empty()) problem.model = problem.model.with_effects(effects);
   const auto is_fitted = [&](const Parameter& p) { return fit->find(p.name, problem.run.file) != nullptr; };
   if (fit && std::none_of(problem.model.parameters().begin(), problem.model.parameters().end(), is_fitted))
     throw InputError({fit->file, 0}, "no parameter of the rig " + rig.file, "wanted a fit of this rig", "Fit it, or leave --fit away.");
@@ -175,6 +200,8 @@ std::vector<std::string> recipe(const SimulateProblem& problem) {
   for (std::size_t j = 0; j < model.parameters().size(); ++j)
     lines.push_back(
         fmt::format("{} = {:.10g} {}", model.parameters()[j].name, problem.theta[static_cast<Index>(j)], model.parameters()[j].unit));
+  for (const std::string& id : model.effect_ids())
+    if (is_law_id(id)) lines.push_back(fmt::format("{}: {}", id, effect(model.rig(), id).equation));
   if (problem.steady_normal_force) lines.push_back(fmt::format("{} = {:.10g} 1", steady_name, *problem.steady_normal_force));
   if (problem.release_load) lines.push_back(fmt::format("released from {:.10g} N", *problem.release_load));
   if (problem.pitch == PitchBetweenSamples::jumps) lines.emplace_back("the angle jumps between samples");
@@ -209,6 +236,7 @@ int simulate_command(int argc, char** argv) {
   app.add_option("--indicial", options.indicial, "circulatory build-up, and the slope, from the table that `unrig correct --indicial` writes");
   app.add_option("--modes", options.normal_modes, "normal modes, in place of the rig file's or the fit's")->check(CLI::PositiveNumber);
   app.add_option("--torsion-modes", options.torsion_modes, "torsional modes, likewise")->check(CLI::PositiveNumber);
+  app.add_option("--law", options.laws, "file (TOML) with a law of your own that is at work, beside those of the fit; may be repeated")->allow_extra_args(false);
   app.add_option("--set", options.settings, "name=value of a model parameter (formats as in fit.json), in SI; may be repeated")->allow_extra_args(false);
   app.add_option("--release-load", options.release_load, "load at the calibration element that a pluck is released from, such as \"20 N\"");
   app.add_flag("--jumps", options.jumps, "the angle jumps from sample to sample: ideal steps, in place of a spline");
@@ -220,7 +248,9 @@ int simulate_command(int argc, char** argv) {
     return app.exit(e) == 0 ? exit_done : exit_wrong_use;
   }
 
-  check_outputs({{"-o", options.output}}, {options.rig, options.run, options.fit, options.indicial});
+  std::vector<std::string> inputs{options.rig, options.run, options.fit, options.indicial};
+  inputs.insert(inputs.end(), options.laws.begin(), options.laws.end());
+  check_outputs({{"-o", options.output}}, inputs);
   const ToSimulate given = problem_of(options, provenance_of(argc, argv));
   const SimulateProblem& problem = given.problem;
   Progress progress;

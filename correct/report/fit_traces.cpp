@@ -35,7 +35,7 @@ std::vector<FitTrace> fit_traces(const Rig& stated_rig, const FittedRig& fit, co
   const Basis basis = rig.is_modal()          ? Basis{}
                       : fit.normal_modes > 0  ? make_basis(rig, fit.normal_modes, fit.torsion_modes)
                                               : make_basis(rig, 0.5 / run.dt, run.density);
-  AeroelasticModel model(rig, basis, wagner(fit.circulation));
+  AeroelasticModel model(with_laws(rig, fit), basis, wagner(fit.circulation));
   if (!fit.effects.empty()) model = model.with_effects(fit.effects);
   const Eigen::VectorXd theta = theta_for(model, fit, run.file, conditions_of(run).onset_angle);
   RunResidual residual(model, run, motion_windows(run));
