@@ -40,4 +40,10 @@ std::string fingerprint(const Run& run) {
   return fmt::format("{:016x}", hash.value());
 }
 
+std::string fingerprint(const std::vector<std::string>& texts) {
+  Fnv1a hash;
+  for (const std::string& text : texts) hash.add(text);
+  return fmt::format("{:016x}", hash.value());
+}
+
 }  // namespace unrig

@@ -1,5 +1,6 @@
 #pragma once
 #include <string>
+#include <vector>
 
 #include "core/run.h"
 
@@ -9,5 +10,8 @@ namespace unrig {
 /// files with the same readings have the same; it is no protection against intent.
 /// Source: G. Fowler, L. C. Noll, K.-P. Vo, D. Eastlake and T. Hansen, The FNV Non-Cryptographic Hash Algorithm (IETF draft), section 2.
 std::string fingerprint(const Run& run);
+
+/// The same of texts, in their order.
+std::string fingerprint(const std::vector<std::string>& texts);
 
 }  // namespace unrig
