@@ -14,6 +14,7 @@
 #include "correct/correct_command.h"
 #include "correct/report/report_command.h"
 #include "fit/apparent_mass_command.h"
+#include "fit/diagnose/collect_command.h"
 #include "fit/diagnose/diagnose_command.h"
 #include "fit/diagnose/trial_command.h"
 #include "fit/fit_command.h"
@@ -28,6 +29,7 @@ constexpr unrig::Command commands[] = {
     {"apparent-mass", "apparent mass of the fluid from the frequencies of a dry and a wet free decay", unrig::apparent_mass_command},
     {"diagnose", "where recordings and model differ, and which physics was left out", unrig::diagnose_command},
     {"trial", "how often diagnose finds what was hidden in simulated campaigns", unrig::trial_command},
+    {"collect", "put the shards of a trial together", unrig::collect_command},
     {"correct", "take the rig out of a gauge record: rigid-rig load and indicial response", unrig::correct_command},
     {"report", "show results as one HTML file: traces, residuals, spectra, parameters", unrig::report_command},
 };

@@ -6,13 +6,14 @@
 #include <algorithm>
 #include <exception>
 #include <mutex>
-#include <nlohmann/json.hpp>
+#include <optional>
 
 #include "core/error.h"
 #include "core/fingerprint.h"
 #include "core/in_parallel.h"
 #include "fit/diagnose/diagnose.h"
 #include "fit/diagnose/trial_campaign.h"
+#include "fit/diagnose/trial_files.h"
 #include "fit/effect_option.h"
 
 namespace unrig {
@@ -47,6 +48,7 @@ std::vector<PlannedRun> plan(const TrialProblem& problem, std::mt19937_64& rando
 TrialOutcome run_trial(const TrialProblem& problem, const Strings& effects, std::size_t trial) {
   std::mt19937_64 random = random_of(problem.seed, trial);
   TrialOutcome outcome;
+  outcome.trial = trial;
   outcome.hidden = hidden_in(effects, trial, problem.pairs, random);
   try {
     const TrialCampaign campaign = draw_campaign(problem.rig, outcome.hidden, plan(problem, random), random);
@@ -95,7 +97,15 @@ EffectScore score_of(const std::string& id, const std::vector<TrialOutcome>& out
   return score;
 }
 
-void tally(TrialResult& result, const Strings& effects) {
+}  // namespace
+
+bool TrialOutcome::right() const { return failure.empty() && name_of(found) == name_of(hidden); }
+
+bool TrialOutcome::among_equivalent() const {
+  return std::any_of(equivalent.begin(), equivalent.end(), [&](const Strings& set) { return name_of(set) == name_of(hidden); });
+}
+
+void tally(TrialResult& result) {
   for (const TrialOutcome& o : result.outcomes) {
     const std::string found = !o.failure.empty() ? "failed" : o.found.empty() && o.unexplained ? "unexplained" : name_of(o.found);
     ++result.confusion[name_of(o.hidden)][found];
@@ -111,15 +121,7 @@ void tally(TrialResult& result, const Strings& effects) {
     if (o.found.empty()) ++result.misses;
     if (std::any_of(o.found.begin(), o.found.end(), [&](const std::string& id) { return !has(o.hidden, id); })) ++result.wrong_names;
   }
-  for (const std::string& id : effects) result.scores[id] = score_of(id, result.outcomes);
-}
-
-}  // namespace
-
-bool TrialOutcome::right() const { return failure.empty() && name_of(found) == name_of(hidden); }
-
-bool TrialOutcome::among_equivalent() const {
-  return std::any_of(equivalent.begin(), equivalent.end(), [&](const Strings& set) { return name_of(set) == name_of(hidden); });
+  for (const std::string& id : result.effects) result.scores[id] = score_of(id, result.outcomes);
 }
 
 std::string name_of(Strings effects) {
@@ -145,6 +147,10 @@ TrialResult run_trials(const TrialProblem& problem) {
     throw InputError({"--outside", 0}, fmt::format("{} to hide in turn, {} at a time", ids.size(), at_a_time), "wanted candidates beside what is hidden", "Name more of --effects.");
   TrialResult result;
   result.seed = problem.seed;
+  result.effects = ids;
+  result.trials = problem.trials;
+  result.shard = problem.shard;
+  result.shards = problem.shards;
   for (const PlannedRun& run : planned) result.noise = std::max(result.noise, run.noise);
   result.rig_file = problem.rig.file;
   result.rig_fingerprint = fingerprint(problem.rig);
@@ -152,51 +158,25 @@ TrialResult run_trials(const TrialProblem& problem) {
     result.recordings.push_back(run.file);
     result.recording_fingerprints.push_back(fingerprint(run, problem.rig));
   }
-  result.outcomes.resize(static_cast<std::size_t>(problem.trials));
+  result.study = study_of(problem, ids);
+  for (auto i = problem.shard - 1; i < static_cast<std::size_t>(problem.trials); i += problem.shards) result.outcomes.emplace_back().trial = i;
+  const TrialCases cases(problem.cases, result.study);
   std::mutex mutex;
   int done = 0;
   in_parallel(result.outcomes.size(), [&](std::size_t i) {
-    result.outcomes[i] = run_trial(problem, ids, i);
+    TrialOutcome& outcome = result.outcomes[i];
+    if (std::optional<TrialOutcome> known = cases.find(outcome.trial)) {
+      outcome = std::move(*known);
+    } else {
+      outcome = run_trial(problem, ids, outcome.trial);
+      cases.keep(outcome);
+    }
     const std::lock_guard guard(mutex);
     ++done;
-    if (problem.progress) problem.progress(fmt::format("{} of {} trials (seed {})", done, problem.trials, problem.seed));
+    if (problem.progress) problem.progress(fmt::format("{} of {} trials (seed {})", done, result.outcomes.size(), problem.seed));
   });
-  tally(result, ids);
+  tally(result);
   return result;
-}
-
-std::string to_json(const TrialResult& r, const Provenance& made) {
-  using nlohmann::ordered_json;
-  ordered_json trials = ordered_json::array(), scores = ordered_json::array();
-  for (const TrialOutcome& o : r.outcomes) {
-    ordered_json one = {{"hidden", o.hidden}, {"parameters", o.parameters}, {"size", o.size}, {"sizes", o.sizes}, {"found", o.found}, {"equivalent", o.equivalent}, {"mismatch", o.mismatch},
-                        {"unexplained", o.unexplained}, {"right", o.right()}, {"seconds", o.seconds}};
-    if (!o.failure.empty()) one["failure"] = o.failure;
-    trials.push_back(one);
-  }
-  for (const auto& [id, s] : r.scores)
-    scores.push_back({{"effect", id}, {"hidden", s.hidden}, {"found", s.found}, {"equivalent", s.equivalent},
-                      {"smallest_found", s.found > 0 ? ordered_json(s.smallest_found) : ordered_json(nullptr)},
-                      {"found_nine_in_ten_from", s.nine_in_ten > 0 ? ordered_json(s.nine_in_ten) : ordered_json(nullptr)}});
-  const ordered_json json = {{"unrig", "trial"}, {"program", made.program}, {"command", made.command}, {"rig", r.rig_file}, {"rig_fingerprint", r.rig_fingerprint},
-                             {"seed", r.seed}, {"noise", {{"gauge", r.noise}, {"unit", "N"}}}, {"recordings", r.recordings}, {"recording_fingerprints", r.recording_fingerprints}, {"nulls", r.nulls}, {"false_alarms", r.false_alarms},
-                             {"wrong_names", r.wrong_names}, {"misses", r.misses}, {"confusion", r.confusion}, {"effects", scores}, {"trials", trials}};
-  return json.dump(2) + "\n";
-}
-
-std::string report(const TrialResult& r) {
-  const std::string like = r.recordings.empty() ? "" : fmt::format(", runs like {}", fmt::join(r.recordings, ", "));
-  std::string text = fmt::format("{} trials, seed {}, noise {:.4g} N{}: {} false alarms in {} campaigns with nothing hidden\n", r.outcomes.size(), r.seed, r.noise, like, r.false_alarms, r.nulls);
-  text += fmt::format("    of {} with something hidden {} named an effect that was not there, {} named nothing\n", static_cast<int>(r.outcomes.size()) - r.nulls - r.failures, r.wrong_names, r.misses);
-  text += "[[Hidden -> found]]\n";
-  for (const auto& [hidden, row] : r.confusion)
-    for (const auto& [found, count] : row) text += fmt::format("    {:<36} {:<36} {:4}\n", hidden, found, count);
-  text += "[[Size: largest r.m.s. of a run over the noise]]\n    effect               found  hidden  as good   least found   nine in ten from\n";
-  const auto number = [](double x) { return x > 0 ? fmt::format("{:.3g}", x) : std::string("-"); };
-  for (const auto& [id, s] : r.scores) text += fmt::format("    {:<20} {:5} {:7} {:8} {:>13} {:>18}\n", id, s.found, s.hidden, s.equivalent, number(s.smallest_found), number(s.nine_in_ten));
-  for (const TrialOutcome& o : r.outcomes)
-    if (!o.failure.empty()) text += fmt::format("    failed with {} hidden: {}\n", name_of(o.hidden), o.failure);
-  return text;
 }
 
 }  // namespace unrig

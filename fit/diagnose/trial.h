@@ -21,11 +21,14 @@ struct TrialProblem {
   unsigned seed = 1;
   std::vector<Run> recordings;       ///< whose conditions, motion, sampling and noise the simulated runs repeat; none: runs are drawn
   std::optional<double> noise;       ///< of the gauge [N]; without it that of the recordings, or 0.03
+  std::size_t shard = 1, shards = 1; ///< only the trials i with i mod shards = shard - 1
+  std::string cases;                 ///< folder in which every trial's outcome is kept and found again; empty: none
   std::function<void(const std::string&)> progress;  ///< called from one thread at a time
 };
 
 /// One campaign and what became of it.
 struct TrialOutcome {
+  std::size_t trial = 0;  ///< i of run_trials
   std::vector<std::string> hidden, found;
   std::vector<std::vector<std::string>> equivalent;  ///< sets that the diagnosis cannot tell from what it found
   std::vector<double> parameters;
@@ -47,7 +50,11 @@ struct EffectScore {
 };
 
 struct TrialResult {
-  std::vector<TrialOutcome> outcomes;
+  std::vector<TrialOutcome> outcomes;  ///< in the order of the trials
+  std::vector<std::string> effects;    ///< hidden in turn
+  int trials = 0;                      ///< of all shards together
+  std::size_t shard = 1, shards = 1;
+  std::string study;                   ///< fingerprint of all that the outcomes depend on (study_of)
   std::map<std::string, std::map<std::string, int>> confusion;  ///< hidden set -> found set -> trials
   std::map<std::string, EffectScore> scores;
   int nulls = 0, false_alarms = 0;    ///< campaigns with nothing hidden, and those of them where something was named
@@ -66,10 +73,10 @@ struct TrialResult {
 /// Throws InputError where the rig cannot be plucked and pitched (trial_campaign.h), a recording cannot be repeated (trial_plan.h), or `outside` would leave no candidate.
 TrialResult run_trials(const TrialProblem& problem);
 
+/// The counts of `result.outcomes`.
+void tally(TrialResult& result);
+
 /// "nothing", or the names with " + " between them, in alphabetical order.
 std::string name_of(std::vector<std::string> effects);
-
-std::string to_json(const TrialResult& result, const Provenance& made = {});
-std::string report(const TrialResult& result);
 
 }  // namespace unrig

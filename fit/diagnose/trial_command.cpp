@@ -3,6 +3,8 @@
 #include <CLI/CLI.hpp>
 #include <fmt/format.h>
 
+#include <tuple>
+
 #include "core/command.h"
 #include "core/command_line.h"
 #include "core/error.h"
@@ -11,7 +13,8 @@
 #include "core/provenance.h"
 #include "core/text_file.h"
 #include "core/units.h"
-#include "fit/diagnose/trial.h"
+#include "fit/diagnose/shard.h"
+#include "fit/diagnose/trial_files.h"
 #include "fit/effect_option.h"
 
 namespace unrig {
@@ -19,7 +22,7 @@ namespace unrig {
 int trial_command(int argc, char** argv) {
   TrialProblem problem;
   CLI::App app{"Hides effects in simulated campaigns of a rig and counts how often `unrig diagnose` finds them.", "unrig trial"};
-  std::string rig, output, noise;
+  std::string rig, output, noise, shard;
   std::vector<std::string> ids, recordings;
   app.add_option("--rig", rig, "rig file (TOML)")->required();
   app.add_option("runs", recordings, "recordings (CSV) that the simulated runs repeat: their conditions, motion, release, sampling and noise; without any, two plucks and three steps are drawn");
@@ -29,6 +32,8 @@ int trial_command(int argc, char** argv) {
   app.add_option("--seed", problem.seed, "of the random numbers")->capture_default_str();
   app.add_option("--noise", noise, "standard deviation of the gauge's noise; without it that of the recordings, or 0.03 N");
   app.add_flag("--outside", problem.outside, "keep what is hidden from the candidates: the right verdict is `unexplained`");
+  app.add_option("--shard", shard, "i/n: only every n-th campaign, from the i-th on, for `unrig collect` to put together; without it as SLURM_ARRAY_TASK_ID or the rank under Open MPI say");
+  app.add_option("--cases", problem.cases, "folder in which the outcome of each campaign is kept: a second call computes only what is missing");
   app.add_option_function<int>("--threads", use_threads, "how many threads to work in; without it, as many as the machine has")->check(CLI::Range(1, 256));
   app.add_option("-o,--output", output, "result (JSON)")->required();
   app.footer("Example:\n  unrig trial --rig rig.toml dry_pluck.csv wet_pluck.csv step.csv --effects tank-wave,gauge-lowpass --trials 30 -o trial.json");
@@ -41,6 +46,7 @@ int trial_command(int argc, char** argv) {
   inputs.push_back(rig);
   check_outputs({{"-o", output}}, inputs);
   check_given_once(recordings);
+  std::tie(problem.shard, problem.shards) = shard_of(shard);
   problem.rig = read_rig(rig);
   problem.rig.givens = nullptr;  // its simulated rigs have just these numbers
   for (const std::string& warning : problem.rig.warnings) warn(warning);
@@ -58,9 +64,9 @@ int trial_command(int argc, char** argv) {
   problem.progress = [&](const std::string& what) { progress(what); };
   const TrialResult result = run_trials(problem);
   progress.clear();
-  write_text(output, to_json(result, provenance_of(argc, argv)));
+  write_text(output, to_json(result, provenance_of(argc, argv, {"--cases"})));
   fmt::print("{}", report(result));
-  if (result.failures == problem.trials) throw NoAnswer("no campaign could be diagnosed: " + result.outcomes.front().failure);
+  if (result.failures > 0 && static_cast<std::size_t>(result.failures) == result.outcomes.size()) throw NoAnswer("no campaign could be diagnosed: " + result.outcomes.front().failure);
   return exit_done;
 }
 

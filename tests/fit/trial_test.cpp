@@ -1,4 +1,4 @@
-#include "fit/diagnose/trial.h"
+#include "fit/diagnose/trial_files.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

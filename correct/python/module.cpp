@@ -1,0 +1,216 @@
+// The library for Python: runs from arrays and files, and the verbs with their results as JSON text, tables or arrays. correct/python/unrig/ makes objects of them.
+#include <pybind11/eigen.h>
+#include <pybind11/functional.h>
+#include <pybind11/pybind11.h>
+#include <pybind11/stl.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <map>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <optional>
+
+#include "core/error.h"
+#include "core/fingerprint.h"
+#include "core/in_parallel.h"
+#include "core/rig.h"
+#include "core/run.h"
+#include "core/units.h"
+#include "correct/correct.h"
+#include "correct/corrected_files.h"
+#include "correct/modal_load.h"
+#include "fit/apparent_mass.h"
+#include "fit/apparent_mass_files.h"
+#include "fit/diagnose/diagnose.h"
+#include "fit/diagnose/diagnosis_files.h"
+#include "fit/diagnose/trial_files.h"
+#include "fit/effect_option.h"
+#include "fit/fit.h"
+#include "fit/fit_files.h"
+#include "fit/fit_json.h"
+
+namespace py = pybind11;
+
+namespace unrig {
+namespace {
+
+using Eigen::Index;
+using Eigen::VectorXd;
+
+/// Tells Python what is being done, and lets an interrupt of the user's end the search.
+std::function<void(const std::string&)> told(const py::object& progress) {
+  const std::shared_ptr<const py::object> callable(new py::object(progress), [](const py::object* object) {
+    const py::gil_scoped_acquire lock;  // the last copy may go in any thread
+    delete object;
+  });
+  return [callable](const std::string& what) {
+    const py::gil_scoped_acquire lock;
+    if (PyErr_CheckSignals() != 0) throw py::error_already_set();
+    if (!callable->is_none()) (*callable)(what);
+  };
+}
+
+/// Times of a record that is sampled evenly.
+void take_times(const Eigen::Ref<const VectorXd>& time, Run& run) {
+  const Index n = time.size();
+  if (n < 3) throw InputError({run.file, 0}, std::to_string(n) + " samples", "wanted three at least", "");
+  run.start = time[0];
+  run.dt = (time[n - 1] - time[0]) / static_cast<double>(n - 1);
+  constexpr double rounding = 1e-3;  // steps, as of run files (core/time_grid.h)
+  for (Index k = 0; k < n; ++k)
+    if (!(std::abs(time[k] - run.start - run.dt * static_cast<double>(k)) <= rounding * run.dt))
+      throw InputError({run.file, 0}, "sample " + std::to_string(k) + " is at " + std::to_string(time[k]) + " s", "wanted increasing times with one step", "Interpolate to a uniform grid, or write a run file.");
+}
+
+/// A run whose columns are arrays: {name: (values, unit)}, each read in place and kept in SI.
+Run run_of_arrays(const std::string& name, const std::string& kind, const Eigen::Ref<const VectorXd>& time, const std::map<std::string, std::pair<Eigen::Ref<const VectorXd>, std::string>>& columns, double density,
+                  double speed, const std::string& medium) {
+  Run run;
+  run.file = run.name = name;
+  run.medium = medium;
+  run.density = density;
+  run.speed = speed;
+  const std::array kinds{RunKind::step, RunKind::pluck, RunKind::forced, RunKind::moved};
+  const auto found = std::find_if(kinds.begin(), kinds.end(), [&](RunKind one) { return to_string(one) == kind; });
+  if (found == kinds.end()) throw InputError({name, 0}, "kind \"" + kind + "\"", "wanted step, pluck, forced or moved", "");
+  run.kind = *found;
+  if (!(density >= 0) || !(speed >= 0) || !std::isfinite(density) || !std::isfinite(speed)) throw InputError({name, 0}, "a density or speed below zero", "wanted kg/m^3 and m/s", "");
+  take_times(time, run);
+  for (const auto& [column, reading] : columns) {
+    const auto& [values, unit] = reading;
+    if (values.size() != time.size()) throw InputError({name, 0}, "\"" + column + "\" has " + std::to_string(values.size()) + " samples", "wanted as many as times, " + std::to_string(time.size()), "");
+    const InputError::Place place{name, 0};
+    const std::string si = si_unit(unit, place, column);
+    const UnitScale scale = unit_scale(unit, si, place, column);
+    Channel channel{column, unit, si, scale.factor, (values.array() * scale.factor + scale.offset).matrix(), 0, 0, 0};
+    channel.missing = static_cast<std::size_t>((!channel.value.array().isFinite()).count());
+    channel.value = channel.value.array().isFinite().select(channel.value, std::nan(""));
+    run.channels.push_back(std::move(channel));
+  }
+  return run;
+}
+
+FitResult fit_of(const Rig& rig, const std::vector<Run>& runs, const std::vector<std::string>& effects, const StartValues& start, const std::vector<std::string>& profile, const py::object& progress) {
+  FitProblem problem;
+  problem.rig = rig;
+  problem.runs = runs;
+  problem.effects = effects_of_option("effects", effects);
+  problem.start = start;
+  problem.profile = profile;
+  problem.progress = told(progress);
+  const py::gil_scoped_release unlocked;
+  return fit(problem);
+}
+
+py::dict load_of(const CorrectedLoad& load) {
+  using namespace py::literals;
+  return py::dict("value"_a = load.value, "std"_a = load.std, "by_source"_a = load.by_source, "half_weight"_a = load.half_weight, "twice_weight"_a = load.twice_weight, "simultaneous"_a = load.simultaneous);
+}
+
+py::dict correction(const Rig& rig, const std::string& fit_json, const std::string& fit_name, const Run& run, double calibration, bool monotone, std::optional<double> at_step) {
+  using namespace py::literals;
+  const CorrectProblem problem{rig, read_fit(nlohmann::json::parse(fit_json), fit_name), run, calibration, {monotone, at_step}};
+  if (rig.is_modal()) {
+    std::optional<ModalLoad> result;
+    {
+      const py::gil_scoped_release unlocked;
+      result = modal_load(problem);
+    }
+    return py::dict("modal"_a = true, "unit"_a = result->unit, "start"_a = result->start, "dt"_a = result->dt, "gauge"_a = result->gauge, "load"_a = result->load, "std"_a = result->std,
+                    "by_source"_a = result->by_source, "warnings"_a = result->warnings, "no_answer"_a = "", "report"_a = report(*result), "noise"_a = result->noise);
+  }
+  std::optional<CorrectResult> result;
+  {
+    const py::gil_scoped_release unlocked;
+    result = correct(problem);
+  }
+  const IndicialResponse& i = result->indicial;
+  return py::dict("modal"_a = false, "unit"_a = "N", "start"_a = result->start, "dt"_a = result->dt, "onset"_a = result->onset, "semichords_per_second"_a = result->semichords_per_second,
+                  "force_per_coefficient"_a = result->force_per_coefficient, "gauge"_a = result->gauge, "unexplained"_a = result->unexplained, "normal_force"_a = load_of(result->normal_force),
+                  "circulatory"_a = load_of(result->circulatory), "indicial_semichords"_a = i.semichords, "indicial"_a = i.value, "indicial_std"_a = i.uncertainty.std, "cn_per_radian"_a = i.per_radian,
+                  "cn_per_radian_std"_a = i.per_radian_std, "slope"_a = result->slope, "slope_std"_a = result->slope_std, "reduced_chi2"_a = result->reduced_chi2, "noise"_a = result->noise,
+                  "warnings"_a = result->warnings, "no_answer"_a = result->no_answer, "report"_a = report(*result));
+}
+
+}  // namespace
+}  // namespace unrig
+
+PYBIND11_MODULE(_unrig, m) {
+  using namespace unrig;
+  using namespace py::literals;
+  m.doc() = "Compiled part of unrig; use the package.";
+  m.attr("__version__") = UNRIG_VERSION;
+  py::register_exception<InputError>(m, "InputError", PyExc_ValueError);
+  py::register_exception<NoAnswer>(m, "NoAnswer", PyExc_RuntimeError);
+
+  py::class_<Rig>(m, "Rig", "A structure, as in a rig file.")
+      .def_readonly("file", &Rig::file)
+      .def_readonly("name", &Rig::name)
+      .def_readonly("chord", &Rig::chord, "m")
+      .def_readonly("warnings", &Rig::warnings)
+      .def_property_readonly("is_modal", &Rig::is_modal)
+      .def("__repr__", [](const Rig& rig) { return "<unrig.Rig " + rig.name + " (" + rig.file + ")>"; });
+  m.def("read_rig", &read_rig, "path"_a);
+
+  py::class_<Run>(m, "Run", "One recording, its columns in SI on a uniform grid.")
+      .def_readonly("file", &Run::file)
+      .def_readonly("name", &Run::name)
+      .def_readonly("medium", &Run::medium)
+      .def_readonly("density", &Run::density, "kg/m^3")
+      .def_readonly("speed", &Run::speed, "m/s")
+      .def_readonly("start", &Run::start, "s")
+      .def_readonly("dt", &Run::dt, "s")
+      .def_readonly("warnings", &Run::warnings)
+      .def_property_readonly("kind", [](const Run& run) { return to_string(run.kind); })
+      .def_property_readonly("columns", [](const Run& run) {
+        std::vector<std::string> names;
+        for (const Channel& channel : run.channels) names.push_back(channel.name);
+        return names;
+      })
+      .def_property_readonly("time", [](const Run& run) { return VectorXd(VectorXd::LinSpaced(run.samples(), run.start, run.time(run.samples() - 1))); }, "s")
+      .def("unit", [](const Run& run, const std::string& column) { return run.channel(column).unit; }, "column"_a, "SI unit of a column.")
+      .def("__getitem__", [](const Run& run, const std::string& column) -> const VectorXd& { return run.channel(column).value; }, py::return_value_policy::reference_internal,
+           "Values of a column in SI: a view of the run's own memory.")
+      .def("__len__", &Run::samples)
+      .def_property_readonly("fingerprint", [](const Run& run) { return fingerprint(run); })
+      .def("__repr__", [](const Run& run) { return "<unrig.Run " + to_string(run.kind) + " " + run.file + ", " + std::to_string(run.samples()) + " samples>"; });
+  m.def("read_run", &read_run, "path"_a);
+  m.def("run_of_arrays", &run_of_arrays, "name"_a, "kind"_a, "time"_a, "columns"_a, "density"_a, "speed"_a, "medium"_a);
+
+  py::class_<FitResult>(m, "Fit")
+      .def_readonly("no_answer", &FitResult::no_answer)
+      .def_property_readonly("json", [](const FitResult& r) { return to_json(r); })
+      .def("report", [](const FitResult& r, double least) { return report(r, least); }, "least"_a = 0.1);
+  m.def("fit", &fit_of, "rig"_a, "runs"_a, "effects"_a, "start"_a, "profile"_a, "progress"_a);
+  m.def("correct", &correction, "rig"_a, "fit_json"_a, "fit_name"_a, "run"_a, "calibration"_a, "monotone"_a, "at_step"_a);
+
+  m.def("apparent_mass", [](const Rig& rig, const Run& dry, const Run& wet, const py::object& progress) {
+    ApparentMassProblem problem;
+    problem.rig = rig, problem.dry = dry, problem.wet = wet;
+    problem.progress = told(progress);
+    const py::gil_scoped_release unlocked;
+    const ApparentMassResult result = apparent_mass(problem);
+    return std::pair{to_json(result), report(result)};
+  });
+  m.def("diagnose", [](const Rig& rig, const std::vector<Run>& runs, const std::vector<Run>& heldout, const std::vector<std::string>& effects, const py::object& progress) {
+    DiagnoseProblem problem;
+    problem.rig = rig, problem.runs = runs, problem.heldout = heldout;
+    problem.effects = effects_of_option("effects", effects);
+    problem.progress = told(progress);
+    const py::gil_scoped_release unlocked;
+    const Diagnosis result = diagnose(problem);
+    return std::pair{to_json(result), report(result)};
+  });
+  m.def("trial", [](const Rig& rig, const std::vector<Run>& recordings, const std::vector<std::string>& effects, int trials, unsigned seed, bool pairs, std::optional<double> noise, const py::object& progress) {
+    TrialProblem problem;
+    problem.rig = rig, problem.recordings = recordings, problem.trials = trials, problem.seed = seed, problem.pairs = pairs, problem.noise = noise;
+    problem.effects = effects_of_option("effects", effects);
+    problem.progress = told(progress);
+    const py::gil_scoped_release unlocked;
+    const TrialResult result = run_trials(problem);
+    return std::pair{to_json(result, {}, false), report(result)};
+  });
+  m.def("use_threads", &use_threads, "threads"_a, "How many threads the library may work in.");
+}
