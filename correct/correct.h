@@ -3,9 +3,9 @@
 #include <string>
 #include <vector>
 
-#include "core/rig.h"
-#include "core/run.h"
-#include "correct/indicial_response.h"
+#include "core/rig/rig.h"
+#include "core/run/run.h"
+#include "correct/estimate/indicial_response.h"
 #include "fit/fit_files.h"
 
 namespace unrig {
@@ -57,11 +57,11 @@ struct CorrectResult {
 ///
 /// The build-up of circulation is 1 - sum_k A_k exp(-beta_k s) with rates beta_k spread evenly over ln s, also slower than the record is long, and free amplitudes: it acts in the load of
 /// the prescribed motion and in that of the rig's own motion, both at once in the coupled model. Amplitudes, slope and motion are estimated together from
-/// gauge and angle. Each amplitude has a normal prior around zero whose standard deviation maximises the evidence (correct/prior.h); it decides what the
+/// gauge and angle. Each amplitude has a normal prior around zero whose standard deviation maximises the evidence (correct/estimate/prior.h); it decides what the
 /// record leaves open. The answers at half and at twice its weight, 1/tau^2, are part of the result.
 ///
 /// Where the shaft moves for longer than the fit's knots can follow (in one motion a knot on every third sample will do, in several with rests between every sample needs one), motion and
-/// load are found by a settled filter and smoother with a knot on every sample, in time and memory that go with the record (correct/restless_run.h, correct/restless_correction.h). It
+/// load are found by a settled filter and smoother with a knot on every sample, in time and memory that go with the record (correct/long_motion/restless_run.h, correct/long_motion/restless_correction.h). It
 /// does not know the rests as such, so that the band is wider there. Nonlinear forces cannot be followed so: a warning says that the knots lie too far apart.
 ///
 /// Effects of the fit are honoured, but those that are part of the load (`wagner-lag`, `separation-lag`): they belong into the answer, and the free response takes their place.
@@ -70,7 +70,7 @@ struct CorrectResult {
 /// those without it: the constrained estimate is the point nearest to the free one in the metric of its information within a convex set that holds the
 /// truth, and no further from it there, so that they are upper estimates.
 ///
-/// Standard deviations by source: correct/uncertainty_budget.h. They are computed at up to some thousand samples, all of those in which the shaft moves as long as
+/// Standard deviations by source: correct/estimate/uncertainty_budget.h. They are computed at up to some thousand samples, all of those in which the shaft moves as long as
 /// these are few, and interpolated between. The gauge's zero and the steady load cannot be told apart: the steady part of the load is the reading
 /// before the motion.
 /// Throws InputError where the run has no angle channel or no stream, NoAnswer where the angle does not move, or where it hardly ever rests and the fit names a nonlinear force.

@@ -3,16 +3,16 @@
 #include <CLI/CLI.hpp>
 #include <fmt/format.h>
 
-#include "core/command.h"
-#include "core/command_line.h"
-#include "core/fingerprint.h"
-#include "core/given_files.h"
-#include "core/provenance.h"
-#include "core/together.h"
+#include "core/files/command.h"
+#include "core/files/command_line.h"
+#include "core/rig/fingerprint.h"
+#include "core/rig/given_files.h"
+#include "core/files/provenance.h"
+#include "core/files/together.h"
 #include "correct/correct.h"
 #include "correct/corrected_files.h"
-#include "correct/modal_load.h"
-#include "fit/fitted_numbers.h"
+#include "correct/modal/modal_load.h"
+#include "fit/givens/fitted_numbers.h"
 
 namespace unrig {
 

@@ -9,7 +9,7 @@
 
 #include <fmt/format.h>
 
-#include "correct/how_far_to_trust.h"
+#include "correct/estimate/how_far_to_trust.h"
 
 namespace unrig {
 namespace {

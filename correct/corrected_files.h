@@ -1,13 +1,13 @@
 #pragma once
 #include <string>
 
-#include "core/provenance.h"
-#include "core/text_file.h"
+#include "core/files/provenance.h"
+#include "core/files/text_file.h"
 #include "correct/correct.h"
 
 namespace unrig {
 
-/// `corrected.csv`: columns as in correct/manual/results.md, the last what a reader must know (correct/how_far_to_trust.h).
+/// `corrected.csv`: columns as in correct/manual/results.md, the last what a reader must know (correct/estimate/how_far_to_trust.h).
 std::string to_csv(const CorrectResult& result, const MadeBy& made_by = {});
 /// The same row by row, for files that are long.
 void to_csv(const TextSink& sink, const CorrectResult& result, const MadeBy& made_by = {});

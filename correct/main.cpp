@@ -6,19 +6,19 @@
 #include <string>
 #include <vector>
 
-#include "core/command.h"
-#include "core/error.h"
+#include "core/files/command.h"
+#include "core/files/error.h"
 #include "core/import/import_command.h"
-#include "core/last_progress.h"
-#include "core/near_word.h"
+#include "core/files/last_progress.h"
+#include "core/files/near_word.h"
 #include "correct/correct_command.h"
 #include "correct/report/report_command.h"
-#include "fit/apparent_mass_command.h"
-#include "fit/diagnose/collect_command.h"
+#include "fit/apparent_mass/apparent_mass_command.h"
+#include "fit/trial/collect_command.h"
 #include "fit/diagnose/diagnose_command.h"
-#include "fit/diagnose/trial_command.h"
+#include "fit/trial/trial_command.h"
 #include "fit/fit_command.h"
-#include "fit/simulate_command.h"
+#include "fit/simulate/simulate_command.h"
 
 namespace {
 

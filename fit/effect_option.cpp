@@ -6,7 +6,7 @@
 #include <stdexcept>
 
 #include "core/effects/effect.h"
-#include "core/error.h"
+#include "core/files/error.h"
 #include "core/law/law_effect.h"
 
 namespace unrig {

@@ -2,8 +2,8 @@
 #include <string>
 #include <vector>
 
-#include "core/rig.h"
-#include "core/run.h"
+#include "core/rig/rig.h"
+#include "core/run/run.h"
 
 namespace unrig {
 

@@ -7,22 +7,22 @@
 #include <fmt/format.h>
 
 #include "core/effects/effect.h"
-#include "core/fingerprint.h"
+#include "core/rig/fingerprint.h"
 #include "core/law/law_effect.h"
-#include "fit/arrival.h"
-#include "fit/decays_first.h"
+#include "fit/search/arrival.h"
+#include "fit/search/decays_first.h"
 #include "fit/effect_option.h"
-#include "fit/effect_search.h"
+#include "fit/search/effect_search.h"
 #include "fit/fit_description.h"
-#include "fit/gauss_newton.h"
-#include "fit/inexact_rig.h"
-#include "fit/no_worse_than_start.h"
-#include "fit/out_of_proportion.h"
-#include "fit/run_order.h"
-#include "fit/uncertainty.h"
-#include "fit/undetermined.h"
-#include "fit/unfitted_modes.h"
-#include "fit/unheard.h"
+#include "fit/solver/gauss_newton.h"
+#include "fit/givens/inexact_rig.h"
+#include "fit/search/no_worse_than_start.h"
+#include "fit/uncertainty/out_of_proportion.h"
+#include "fit/likelihood/run_order.h"
+#include "fit/uncertainty/uncertainty.h"
+#include "fit/uncertainty/undetermined.h"
+#include "fit/uncertainty/unfitted_modes.h"
+#include "fit/uncertainty/unheard.h"
 
 namespace unrig {
 namespace {
@@ -41,7 +41,7 @@ double step_left(const JointProblem& joint) {
 }
 
 /// Halves the steps in which nonlinear laws are followed until half of them would move the unknowns by less than a third of a standard error, all together. The error
-/// of a law goes with the square of the step (core/nonlinear_response.h): three quarters of it show, and at most four ninths of a standard error are left.
+/// of a law goes with the square of the step (core/propagate/nonlinear_response.h): three quarters of it show, and at most four ninths of a standard error are left.
 void settle_steps(Arrival& arrival) {
   if (!follows_smooth_laws(arrival.joint)) return;
   constexpr Eigen::Index most = 8;

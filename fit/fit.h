@@ -4,13 +4,13 @@
 #include <string>
 #include <vector>
 
-#include "core/aeroelastic_model.h"
-#include "core/rig.h"
-#include "core/run.h"
-#include "core/wagner.h"
-#include "fit/determined.h"
-#include "fit/profile.h"
-#include "fit/undetermined.h"
+#include "core/model/aeroelastic_model.h"
+#include "core/rig/rig.h"
+#include "core/run/run.h"
+#include "core/model/wagner.h"
+#include "fit/uncertainty/determined.h"
+#include "fit/uncertainty/profile.h"
+#include "fit/uncertainty/undetermined.h"
 
 namespace unrig {
 
@@ -53,7 +53,7 @@ struct FittedChannel {
 
 struct FittedRun {
   std::string file;
-  std::string fingerprint;  ///< of its readings (core/fingerprint.h)
+  std::string fingerprint;  ///< of its readings (core/rig/fingerprint.h)
   double onset_angle = 0;  ///< rad (RunConditions)
   Eigen::Index samples = 0;
   double chi2 = 0;
@@ -61,7 +61,7 @@ struct FittedRun {
   std::vector<FittedChannel> channels;  ///< the fitted outputs, then `alpha` where the motion was estimated
   bool aside = false;    ///< it crosses the corners of a law for so long that no search follows it: it had no part in the fit
   double whiteness = 1;  ///< probability that white noise looks at least as coloured as the residual
-  double followed = 1;   ///< share of the readings' variance that the model follows (fit/share_followed.h), of the channel that it follows least
+  double followed = 1;   ///< share of the readings' variance that the model follows (fit/likelihood/share_followed.h), of the channel that it follows least
   double reduced_chi2() const { return chi2 / static_cast<double>(degrees_of_freedom); }
   /// Whether chi-square is what noise would leave: it scatters by sqrt(2/n), the noise level that it counts in, and its square, by a few per cent.
   bool explained() const;
@@ -99,7 +99,7 @@ struct FitResult {
   std::vector<std::string> effects;
   Eigen::Index law_steps = 1;   ///< nonlinear laws were followed in so many times the steps that they ask for
   std::string rig_file;
-  std::string rig_fingerprint;  ///< of the rig's numbers (core/fingerprint.h)
+  std::string rig_fingerprint;  ///< of the rig's numbers (core/rig/fingerprint.h)
   std::string program, command; ///< version and command line that made this result; empty where it was not read from or for a file
   std::vector<FittedGiven> givens;
   Eigen::MatrixXd joint_covariance;  ///< of `parameters`, then `givens`; empty without givens
@@ -118,11 +118,11 @@ struct FitResult {
 /// whole record is not explained in the end, once more from stiffnesses around it.
 ///
 /// Standard errors: where the residual of a run is white (1 % test of its cumulative periodogram), the inverse Gauss-Newton Hessian, times the reduced
-/// chi-square where that exceeds one; where any is coloured, the covariance that follows from the residuals' own spectra (fit/coloured_noise.h).
+/// chi-square where that exceeds one; where any is coloured, the covariance that follows from the residuals' own spectra (fit/uncertainty/coloured_noise.h).
 /// Both are in the result. What the runs do not determine is held; the standard errors of the others allow for as much as it may be off
-/// (fit/undetermined.h), and where that leaves nothing known of one it is not identified either: `determined` then has the combination that is.
+/// (fit/uncertainty/undetermined.h), and where that leaves nothing known of one it is not identified either: `determined` then has the combination that is.
 ///
-/// There is no answer (`no_answer`) where the search has not converged, a run is left with more than half of the variance of a channel (fit/share_followed.h) and not with its
+/// There is no answer (`no_answer`) where the search has not converged, a run is left with more than half of the variance of a channel (fit/likelihood/share_followed.h) and not with its
 /// noise (a wrong minimum, or not this rig), fewer than 20 degrees of freedom remain (the scatter itself is then known to worse than 1/sqrt(40)), or nothing is determined.
 /// No parameter is `identified` then.
 /// Throws InputError where a run does not belong to the rig or is too short to say more than where it starts, or a name belongs to no parameter.

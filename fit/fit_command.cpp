@@ -6,16 +6,16 @@
 #include <algorithm>
 #include <filesystem>
 
-#include "core/command.h"
-#include "core/command_line.h"
-#include "core/given_files.h"
-#include "core/in_parallel.h"
-#include "core/provenance.h"
-#include "core/text_file.h"
+#include "core/files/command.h"
+#include "core/files/command_line.h"
+#include "core/rig/given_files.h"
+#include "core/numerics/in_parallel.h"
+#include "core/files/provenance.h"
+#include "core/files/text_file.h"
 #include "fit/effect_option.h"
 #include "fit/fit.h"
 #include "fit/fit_files.h"
-#include "fit/price.h"
+#include "fit/givens/price.h"
 
 namespace unrig {
 

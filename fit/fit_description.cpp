@@ -8,13 +8,13 @@
 #include <fmt/format.h>
 
 #include "core/effects/effect.h"
-#include "core/error.h"
-#include "core/fingerprint.h"
-#include "core/gauge_lever.h"
-#include "fit/coloured_noise.h"
-#include "fit/explained.h"
-#include "fit/readings_noise.h"
-#include "fit/share_followed.h"
+#include "core/files/error.h"
+#include "core/rig/fingerprint.h"
+#include "core/rig/gauge_lever.h"
+#include "fit/uncertainty/coloured_noise.h"
+#include "fit/likelihood/explained.h"
+#include "fit/likelihood/readings_noise.h"
+#include "fit/likelihood/share_followed.h"
 
 namespace unrig {
 

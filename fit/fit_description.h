@@ -1,10 +1,10 @@
 #pragma once
 #include <string>
 
-#include "fit/arrival.h"
+#include "fit/search/arrival.h"
 #include "fit/fit.h"
-#include "fit/joint_problem.h"
-#include "fit/uncertainty.h"
+#include "fit/likelihood/joint_problem.h"
+#include "fit/uncertainty/uncertainty.h"
 
 namespace unrig {
 

@@ -10,10 +10,10 @@
 #include <nlohmann/json.hpp>
 
 #include "core/effects/effect.h"
-#include "core/fingerprint.h"
-#include "core/given_files.h"
+#include "core/rig/fingerprint.h"
+#include "core/rig/given_files.h"
 #include "core/law/law_effect.h"
-#include "core/text_file.h"
+#include "core/files/text_file.h"
 #include "fit/fit_json.h"
 
 namespace unrig {

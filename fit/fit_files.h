@@ -15,7 +15,7 @@ std::string to_json(const FitResult& result, const std::vector<std::shared_ptr<c
 /// Parameters of a `fit.json`, as far as `simulate` and `correct` need them.
 struct FittedRig {
   std::string file;
-  std::string rig_file, rig_fingerprint;  ///< of the rig that was fitted (core/fingerprint.h); empty in a fit.json of an earlier version
+  std::string rig_file, rig_fingerprint;  ///< of the rig that was fitted (core/rig/fingerprint.h); empty in a fit.json of an earlier version
   Wagner circulation = Wagner::within_1e4;
   Eigen::Index normal_modes = 0, torsion_modes = 0;
   std::vector<std::string> effects;  ///< at work in the fitted model
@@ -26,7 +26,7 @@ struct FittedRig {
   std::vector<FittedGiven> givens;     ///< numbers that stated their uncertainty, as they came out
   Eigen::MatrixXd joint_covariance;    ///< of `parameters`, then `givens`; empty without givens
   std::vector<std::string> runs;
-  std::vector<std::string> fingerprints;  ///< of the runs (core/fingerprint.h), empty in a fit.json of an earlier version
+  std::vector<std::string> fingerprints;  ///< of the runs (core/rig/fingerprint.h), empty in a fit.json of an earlier version
   std::vector<double> onset_angles;  ///< rad, of the runs; not a number in a fit.json of an earlier version, empty in a fit made in code
 
   /// The recording that the fit knows this file as, empty if it took no part: the same path or file; by its name, and the folders that agree, only where the fit's own file is no longer there.

@@ -27,11 +27,11 @@ set(in_this_environment env LSAN_OPTIONS=suppressions=${CMAKE_CURRENT_SOURCE_DIR
 
 set_property(DIRECTORY APPEND PROPERTY CMAKE_CONFIGURE_DEPENDS fuzz/sources.txt)
 file(STRINGS fuzz/sources.txt careful)
-list(APPEND careful core/run_text.cpp core/import/import.cpp)
+list(APPEND careful core/run/run_text.cpp core/import/import.cpp)
 list(TRANSFORM careful PREPEND ${PROJECT_SOURCE_DIR}/)
 set_source_files_properties(${careful} PROPERTIES SKIP_UNITY_BUILD_INCLUSION ON COMPILE_OPTIONS "${careful_of_pointers}")
 # As in the floors' own lists: source properties hold in one directory.
-set(kernels ${PROJECT_SOURCE_DIR}/core/small_product ${PROJECT_SOURCE_DIR}/core/householder)
+set(kernels ${PROJECT_SOURCE_DIR}/core/numerics/small_product ${PROJECT_SOURCE_DIR}/core/numerics/householder)
 list(TRANSFORM kernels APPEND .cpp OUTPUT_VARIABLE chosen)
 list(TRANSFORM kernels APPEND _avx2.cpp OUTPUT_VARIABLE wide)
 if(CMAKE_SYSTEM_PROCESSOR MATCHES "x86_64|AMD64")
@@ -41,7 +41,7 @@ else()
   set_source_files_properties(${wide} PROPERTIES HEADER_FILE_ONLY ON)
 endif()
 # Has a helper that is named like another's.
-set_source_files_properties(${PROJECT_SOURCE_DIR}/fit/diagnose/trial.cpp PROPERTIES SKIP_UNITY_BUILD_INCLUSION ON)
+set_source_files_properties(${PROJECT_SOURCE_DIR}/fit/trial/trial.cpp PROPERTIES SKIP_UNITY_BUILD_INCLUSION ON)
 
 add_library(unrig_sanitizers INTERFACE)
 target_compile_options(unrig_sanitizers INTERFACE ${unrig_sanitizers} ${careless_of_pointers})

@@ -5,7 +5,7 @@
 #include <numbers>
 #include <stdexcept>
 
-#include "core/feedback_force.h"
+#include "core/propagate/feedback_force.h"
 #include "core/law/law_effect.h"
 
 namespace unrig {
@@ -79,7 +79,7 @@ void append_strip_signal(LinearSystem& system, const EffectContext& c, const Dua
 }
 
 void append_feedback(LinearSystem& system, const DualMatrix& direction, Feedback feedback) {
-  if (feedback.parameters > most_law_parameters || feedback.sees.rows() > most_law_arguments) throw std::logic_error("a law with more parameters or arguments than core/feedback_force.h has room for");
+  if (feedback.parameters > most_law_parameters || feedback.sees.rows() > most_law_arguments) throw std::logic_error("a law with more parameters or arguments than core/propagate/feedback_force.h has room for");
   for (DualMatrix* m : {&system.B, &system.D}) {
     const DualMatrix push = *m * direction;
     const Index columns = m->cols();
@@ -102,7 +102,7 @@ Index append_memory(LinearSystem& system, const DualMatrix& direction, const Dua
   rate.sees.conservativeResizeLike(MatrixXd::Zero(rate.sees.rows(), memory + 1));
   rate.sees.conservativeResizeLike(MatrixXd::Zero(rate.sees.rows() + 1, memory + 1));
   rate.sees(rate.sees.rows() - 1, memory) = 1;
-  if (rate.parameters > most_law_parameters || rate.sees.rows() > most_law_arguments) throw std::logic_error("a law with more parameters or arguments than core/feedback_force.h has room for");
+  if (rate.parameters > most_law_parameters || rate.sees.rows() > most_law_arguments) throw std::logic_error("a law with more parameters or arguments than core/propagate/feedback_force.h has room for");
   system.feedback.push_back(std::move(rate));
   return memory;
 }

@@ -1,5 +1,5 @@
 #include "core/effects/list.h"
-#include "core/gauge_filter.h"
+#include "core/rig/gauge_filter.h"
 
 namespace unrig {
 

@@ -6,8 +6,8 @@
 #include <utility>
 #include <vector>
 
-#include "core/aeroelastic_model.h"
-#include "core/feedback_force.h"
+#include "core/model/aeroelastic_model.h"
+#include "core/propagate/feedback_force.h"
 
 namespace unrig {
 

@@ -1,7 +1,7 @@
 #include <numbers>
 
 #include "core/effects/list.h"
-#include "core/gauge_filter.h"
+#include "core/rig/gauge_filter.h"
 
 namespace unrig {
 

@@ -7,9 +7,9 @@
 #include <Eigen/Core>
 #include <fmt/format.h>
 
-#include "core/error.h"
-#include "core/motion.h"
-#include "core/units.h"
+#include "core/files/error.h"
+#include "core/run/motion.h"
+#include "core/files/units.h"
 
 namespace unrig {
 namespace {

@@ -6,7 +6,7 @@
 namespace unrig {
 
 /// The channels of a recording as a table: samples, unit, sampling rate, smallest, largest and mean value, and the standard deviation of the white noise
-/// (core/motion.h). A rate is the file's, or that of a column of evenly spaced times. Behind them stands what else is to be known of a channel.
+/// (core/run/motion.h). A rate is the file's, or that of a column of evenly spaced times. Behind them stands what else is to be known of a channel.
 std::string channel_list(const Recording& recording);
 
 }  // namespace unrig

@@ -6,12 +6,12 @@
 
 #include <fmt/format.h>
 
-#include "core/error.h"
+#include "core/files/error.h"
 #include "core/import/number_form.h"
 #include "core/import/table_cells.h"
 #include "core/import/time_stamp.h"
-#include "core/scan.h"
-#include "core/text_kind.h"
+#include "core/files/scan.h"
+#include "core/files/text_kind.h"
 
 namespace unrig {
 namespace {

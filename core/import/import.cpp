@@ -10,7 +10,7 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
-#include "core/column_names.h"
+#include "core/run/column_names.h"
 #include "core/import/bridge.h"
 #include "core/import/delimited.h"
 #include "core/import/lvm.h"
@@ -18,12 +18,12 @@
 #include "core/import/mat73.h"
 #include "core/import/tdms.h"
 #include "core/import/uff.h"
-#include "core/run.h"
-#include "core/run_text.h"
-#include "core/text_file.h"
-#include "core/text_kind.h"
-#include "core/toml_table.h"
-#include "core/units.h"
+#include "core/run/run.h"
+#include "core/run/run_text.h"
+#include "core/files/text_file.h"
+#include "core/files/text_kind.h"
+#include "core/files/toml_table.h"
+#include "core/files/units.h"
 
 namespace unrig {
 namespace {

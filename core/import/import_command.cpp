@@ -3,13 +3,13 @@
 #include <CLI/CLI.hpp>
 #include <fmt/format.h>
 
-#include "core/command.h"
-#include "core/command_line.h"
-#include "core/error.h"
-#include "core/given_files.h"
+#include "core/files/command.h"
+#include "core/files/command_line.h"
+#include "core/files/error.h"
+#include "core/rig/given_files.h"
 #include "core/import/channel_list.h"
 #include "core/import/import.h"
-#include "core/text_file.h"
+#include "core/files/text_file.h"
 
 namespace unrig {
 

@@ -7,12 +7,12 @@
 
 #include <fmt/format.h>
 
-#include "core/error.h"
+#include "core/files/error.h"
 #include "core/import/number_form.h"
 #include "core/import/table_cells.h"
-#include "core/near_word.h"
-#include "core/scan.h"
-#include "core/units.h"
+#include "core/files/near_word.h"
+#include "core/files/scan.h"
+#include "core/files/units.h"
 
 namespace unrig {
 namespace {
@@ -95,7 +95,7 @@ bool is_x(const RecordedChannel& channel) { return channel.name == "X_Value"; }
 
 /// Whether a column of times goes on as evenly as Delta_X says.
 bool agrees(const std::vector<double>& times, double step) {
-  constexpr double rounding = 1e-3;  // steps, as core/time_grid.h has it
+  constexpr double rounding = 1e-3;  // steps, as core/run/time_grid.h has it
   if (times.size() < 2) return false;
   const double last = times.front() + step * static_cast<double>(times.size() - 1);
   return std::abs(times.back() - last) <= rounding * step * static_cast<double>(times.size() - 1);

@@ -7,7 +7,7 @@
 
 #include <fmt/format.h>
 
-#include "core/error.h"
+#include "core/files/error.h"
 #include "core/import/byte_reader.h"
 #include "core/import/matlab_matrix.h"
 

@@ -23,11 +23,11 @@
 #include <optional>
 #include <stdexcept>
 
-#include "core/error.h"
+#include "core/files/error.h"
 #include "core/import/byte_reader.h"
 #include "core/import/matlab_matrix.h"
-#include "core/scan.h"
-#include "core/text_file.h"
+#include "core/files/scan.h"
+#include "core/files/text_file.h"
 
 namespace unrig {
 namespace {

@@ -4,7 +4,7 @@
 
 #include <fmt/format.h>
 
-#include "core/near_word.h"
+#include "core/files/near_word.h"
 
 namespace unrig {
 

@@ -4,7 +4,7 @@
 
 #include <fmt/format.h>
 
-#include "core/scan.h"
+#include "core/files/scan.h"
 
 namespace unrig {
 namespace {

@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "core/scan.h"
+#include "core/files/scan.h"
 
 namespace unrig {
 namespace {

@@ -7,10 +7,10 @@
 
 #include <fmt/format.h>
 
-#include "core/error.h"
+#include "core/files/error.h"
 #include "core/import/byte_reader.h"
 #include "core/import/delimited.h"
-#include "core/scan.h"
+#include "core/files/scan.h"
 
 namespace unrig {
 namespace {

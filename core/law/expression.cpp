@@ -6,7 +6,7 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
-#include "core/scan.h"
+#include "core/files/scan.h"
 
 namespace unrig {
 namespace {

@@ -7,10 +7,10 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
-#include "core/feedback_force.h"
-#include "core/text_file.h"
-#include "core/toml_table.h"
-#include "core/units.h"
+#include "core/propagate/feedback_force.h"
+#include "core/files/text_file.h"
+#include "core/files/toml_table.h"
+#include "core/files/units.h"
 
 namespace unrig {
 namespace {

@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "core/aeroelastic_model.h"
+#include "core/model/aeroelastic_model.h"
 #include "core/law/expression.h"
 
 namespace unrig {

@@ -8,7 +8,7 @@
 
 #include <fmt/format.h>
 
-#include "core/feedback_force.h"
+#include "core/propagate/feedback_force.h"
 
 namespace unrig {
 namespace {

@@ -22,7 +22,7 @@ struct LawEffect : Effect {
 ///   x' = A x + B (u + direction f(symbols)),   z' = memory(symbols, z)
 ///
 /// A term `factor * a` is a mass: with a = r x' it is solved for exactly, f = factor a_0 / (1 - factor r b), a_0 the acceleration without it, b what a unit force does to x'.
-/// A term `factor * z` is linear and stays with the exact step (core/nonlinear_response.h); the rest runs straight from step to step.
+/// A term `factor * z` is linear and stays with the exact step (core/propagate/nonlinear_response.h); the rest runs straight from step to step.
 std::shared_ptr<const LawEffect> law_effect(Law law);
 
 /// Puts a law to a rig. Throws InputError where the rig has one of the same id.

@@ -12,20 +12,20 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 
-#include "core/error.h"
-#include "core/fingerprint.h"
-#include "core/in_parallel.h"
-#include "core/rig.h"
-#include "core/run.h"
-#include "core/units.h"
+#include "core/files/error.h"
+#include "core/rig/fingerprint.h"
+#include "core/numerics/in_parallel.h"
+#include "core/rig/rig.h"
+#include "core/run/run.h"
+#include "core/files/units.h"
 #include "correct/correct.h"
 #include "correct/corrected_files.h"
-#include "correct/modal_load.h"
-#include "fit/apparent_mass.h"
-#include "fit/apparent_mass_files.h"
+#include "correct/modal/modal_load.h"
+#include "fit/apparent_mass/apparent_mass.h"
+#include "fit/apparent_mass/apparent_mass_files.h"
 #include "fit/diagnose/diagnose.h"
 #include "fit/diagnose/diagnosis_files.h"
-#include "fit/diagnose/trial_files.h"
+#include "fit/trial/trial_files.h"
 #include "fit/effect_option.h"
 #include "fit/fit.h"
 #include "fit/fit_files.h"
@@ -58,7 +58,7 @@ void take_times(const Eigen::Ref<const VectorXd>& time, Run& run) {
   if (n < 3) throw InputError({run.file, 0}, std::to_string(n) + " samples", "wanted three at least", "");
   run.start = time[0];
   run.dt = (time[n - 1] - time[0]) / static_cast<double>(n - 1);
-  constexpr double rounding = 1e-3;  // steps, as of run files (core/time_grid.h)
+  constexpr double rounding = 1e-3;  // steps, as of run files (core/run/time_grid.h)
   for (Index k = 0; k < n; ++k)
     if (!(std::abs(time[k] - run.start - run.dt * static_cast<double>(k)) <= rounding * run.dt))
       throw InputError({run.file, 0}, "sample " + std::to_string(k) + " is at " + std::to_string(time[k]) + " s", "wanted increasing times with one step", "Interpolate to a uniform grid, or write a run file.");

@@ -2,10 +2,10 @@
 
 #include <fmt/format.h>
 
-#include "core/command.h"
-#include "core/error.h"
-#include "core/run.h"
-#include "core/spectrum.h"
+#include "core/files/command.h"
+#include "core/files/error.h"
+#include "core/run/run.h"
+#include "core/numerics/spectrum.h"
 #include "correct/report/result_files.h"
 
 namespace unrig {

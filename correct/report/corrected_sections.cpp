@@ -3,10 +3,10 @@
 
 #include <fmt/format.h>
 
-#include "core/csv_table.h"
-#include "core/units.h"
-#include "core/wagner.h"
-#include "correct/how_far_to_trust.h"
+#include "core/files/csv_table.h"
+#include "core/files/units.h"
+#include "core/model/wagner.h"
+#include "correct/estimate/how_far_to_trust.h"
 #include "correct/report/result_files.h"
 
 namespace unrig {

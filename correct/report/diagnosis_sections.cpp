@@ -5,8 +5,8 @@
 
 #include <fmt/format.h>
 
-#include "core/command.h"
-#include "core/error.h"
+#include "core/files/command.h"
+#include "core/files/error.h"
 #include "correct/report/fit_traces.h"
 #include "correct/report/result_files.h"
 #include "fit/fit_json.h"

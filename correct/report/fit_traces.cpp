@@ -4,10 +4,10 @@
 
 #include <fmt/format.h>
 
-#include "core/command.h"
-#include "core/wagner.h"
-#include "fit/fitted_numbers.h"
-#include "fit/run_residual.h"
+#include "core/files/command.h"
+#include "core/model/wagner.h"
+#include "fit/givens/fitted_numbers.h"
+#include "fit/likelihood/run_residual.h"
 
 namespace unrig {
 

@@ -6,14 +6,14 @@
 #include <algorithm>
 #include <vector>
 
-#include "core/command.h"
-#include "core/command_line.h"
-#include "core/error.h"
-#include "core/given_files.h"
-#include "core/provenance.h"
-#include "core/text_file.h"
+#include "core/files/command.h"
+#include "core/files/command_line.h"
+#include "core/files/error.h"
+#include "core/rig/given_files.h"
+#include "core/files/provenance.h"
+#include "core/files/text_file.h"
 #include "correct/report/result_files.h"
-#include "fit/simulated_run.h"
+#include "fit/simulate/simulated_run.h"
 
 namespace unrig {
 namespace {

@@ -6,7 +6,7 @@
 
 #include <fmt/format.h>
 
-#include "core/spectrum.h"
+#include "core/numerics/spectrum.h"
 
 namespace unrig {
 

@@ -5,7 +5,7 @@
 
 #include <nlohmann/json.hpp>
 
-#include "core/provenance.h"
+#include "core/files/provenance.h"
 #include "correct/report/report_page.h"
 
 namespace unrig {

@@ -5,11 +5,11 @@
 
 #include <fmt/format.h>
 
-#include "core/command.h"
-#include "core/motion.h"
-#include "core/run.h"
+#include "core/files/command.h"
+#include "core/run/motion.h"
+#include "core/run/run.h"
 #include "correct/report/result_files.h"
-#include "fit/simulated_run.h"
+#include "fit/simulate/simulated_run.h"
 
 namespace unrig {
 namespace {

@@ -6,16 +6,16 @@
 #include <set>
 
 #include "core/effects/effect.h"
-#include "core/error.h"
-#include "core/fingerprint.h"
-#include "core/in_parallel.h"
-#include "fit/decays_first.h"
+#include "core/files/error.h"
+#include "core/rig/fingerprint.h"
+#include "core/numerics/in_parallel.h"
+#include "fit/search/decays_first.h"
 #include "fit/diagnose/heldout.h"
 #include "fit/diagnose/selection.h"
-#include "fit/effect_search.h"
+#include "fit/search/effect_search.h"
 #include "fit/fit_description.h"
-#include "fit/inexact_rig.h"
-#include "fit/run_order.h"
+#include "fit/givens/inexact_rig.h"
+#include "fit/likelihood/run_order.h"
 
 namespace unrig {
 namespace {

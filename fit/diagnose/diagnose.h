@@ -4,9 +4,9 @@
 #include <string>
 #include <vector>
 
-#include "core/rig.h"
-#include "core/run.h"
-#include "core/wagner.h"
+#include "core/rig/rig.h"
+#include "core/run/run.h"
+#include "core/model/wagner.h"
 #include "fit/diagnose/maps.h"
 #include "fit/diagnose/mismatch.h"
 #include "fit/diagnose/missing_force.h"
@@ -93,7 +93,7 @@ struct Diagnosis {
 /// with amplitudes of their own in every run), and where runs that were not fitted are predicted better with it than without: those held out or, where there are
 /// none, each fitted run from the others. Otherwise the mismatch is unexplained, and the force is given that would explain it.
 ///
-/// No digit of it depends on the order of the runs (fit/run_order.h).
+/// No digit of it depends on the order of the runs (fit/likelihood/run_order.h).
 /// Throws InputError where a run does not belong to the rig.
 Diagnosis diagnose(const DiagnoseProblem& problem);
 

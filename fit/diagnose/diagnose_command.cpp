@@ -3,13 +3,13 @@
 #include <CLI/CLI.hpp>
 #include <fmt/format.h>
 
-#include "core/command.h"
-#include "core/command_line.h"
-#include "core/error.h"
-#include "core/given_files.h"
-#include "core/in_parallel.h"
-#include "core/provenance.h"
-#include "core/together.h"
+#include "core/files/command.h"
+#include "core/files/command_line.h"
+#include "core/files/error.h"
+#include "core/rig/given_files.h"
+#include "core/numerics/in_parallel.h"
+#include "core/files/provenance.h"
+#include "core/files/together.h"
 #include "fit/diagnose/diagnose.h"
 #include "fit/diagnose/diagnosis_files.h"
 #include "fit/effect_option.h"

@@ -7,9 +7,9 @@
 #include <fmt/ranges.h>
 #include <nlohmann/json.hpp>
 
-#include "core/text_file.h"
+#include "core/files/text_file.h"
 #include "fit/fit_files.h"
-#include "fit/out_of_proportion.h"
+#include "fit/uncertainty/out_of_proportion.h"
 
 namespace unrig {
 namespace {

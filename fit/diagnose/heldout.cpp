@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "fit/undetermined.h"
+#include "fit/uncertainty/undetermined.h"
 
 namespace unrig {
 

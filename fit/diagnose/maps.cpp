@@ -3,9 +3,9 @@
 #include <algorithm>
 #include <cmath>
 
-#include "core/spectrum.h"
+#include "core/numerics/spectrum.h"
 #include "fit/diagnose/run_states.h"
-#include "fit/standardised_residual.h"
+#include "fit/likelihood/standardised_residual.h"
 
 namespace unrig {
 namespace {

@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "fit/joint_problem.h"
+#include "fit/likelihood/joint_problem.h"
 
 namespace unrig {
 

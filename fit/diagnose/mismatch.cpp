@@ -5,10 +5,10 @@
 
 #include <fmt/format.h>
 
-#include "core/spectrum.h"
-#include "core/text_file.h"
-#include "fit/coloured_noise.h"
-#include "fit/standardised_residual.h"
+#include "core/numerics/spectrum.h"
+#include "core/files/text_file.h"
+#include "fit/uncertainty/coloured_noise.h"
+#include "fit/likelihood/standardised_residual.h"
 
 namespace unrig {
 namespace {

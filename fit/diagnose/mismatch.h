@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "fit/diagnose/run_states.h"
-#include "fit/joint_problem.h"
+#include "fit/likelihood/joint_problem.h"
 
 namespace unrig {
 

@@ -3,8 +3,8 @@
 #include <Eigen/LU>
 #include <cmath>
 
-#include "core/exact_step.h"
-#include "core/in_parallel.h"
+#include "core/propagate/exact_step.h"
+#include "core/numerics/in_parallel.h"
 
 namespace unrig {
 namespace {

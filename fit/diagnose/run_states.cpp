@@ -6,7 +6,7 @@
 #include <fmt/format.h>
 
 #include "core/effects/effect.h"
-#include "core/run_inputs.h"
+#include "core/model/run_inputs.h"
 
 namespace unrig {
 

@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "fit/run_residual.h"
+#include "fit/likelihood/run_residual.h"
 
 namespace unrig {
 

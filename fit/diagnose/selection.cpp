@@ -10,8 +10,8 @@
 #include <fmt/ranges.h>
 
 #include "core/effects/effect.h"
-#include "core/in_parallel.h"
-#include "fit/decays_first.h"
+#include "core/numerics/in_parallel.h"
+#include "fit/search/decays_first.h"
 #include "fit/diagnose/mismatch.h"
 
 namespace unrig {

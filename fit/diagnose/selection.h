@@ -3,7 +3,7 @@
 #include <vector>
 
 #include "fit/diagnose/diagnose.h"
-#include "fit/effect_search.h"
+#include "fit/search/effect_search.h"
 
 namespace unrig {
 

@@ -7,8 +7,8 @@
 
 #include <fmt/format.h>
 
-#include "core/simulate.h"
-#include "core/text_file.h"
+#include "core/model/simulate.h"
+#include "core/files/text_file.h"
 
 namespace unrig {
 namespace {

@@ -2,7 +2,7 @@
 #include <optional>
 #include <string>
 
-#include "fit/arrival.h"
+#include "fit/search/arrival.h"
 
 namespace unrig {
 

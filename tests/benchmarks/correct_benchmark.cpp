@@ -9,8 +9,8 @@
 #include <numbers>
 #include <random>
 
-#include "core/simulate.h"
-#include "core/text_file.h"
+#include "core/model/simulate.h"
+#include "core/files/text_file.h"
 #include "correct/correct.h"
 #include "fit/fit.h"
 #include "tests/support/sample_data.h"

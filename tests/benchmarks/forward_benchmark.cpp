@@ -3,10 +3,10 @@
 
 #include <benchmark/benchmark.h>
 
-#include "core/aeroelastic_model.h"
-#include "core/exact_step.h"
-#include "core/motion.h"
-#include "core/response.h"
+#include "core/model/aeroelastic_model.h"
+#include "core/propagate/exact_step.h"
+#include "core/run/motion.h"
+#include "core/propagate/response.h"
 #include "tests/support/sample_data.h"
 
 namespace unrig {

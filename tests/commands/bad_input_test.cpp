@@ -13,7 +13,7 @@
 
 #include <nlohmann/json.hpp>
 
-#include "core/text_file.h"
+#include "core/files/text_file.h"
 #include "tests/commands/run_unrig.h"
 #include "tests/support/sample_data.h"
 

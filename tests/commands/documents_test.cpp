@@ -16,7 +16,7 @@
 #include <nlohmann/json.hpp>
 
 #include "core/effects/effect.h"
-#include "core/text_file.h"
+#include "core/files/text_file.h"
 #include "tests/commands/run_unrig.h"
 #include "tests/support/sample_data.h"
 
@@ -216,7 +216,7 @@ TEST(Documents, TheManualNamesEveryKeyOfTheReaders) {
     const char* source;
     const std::string& page;
     std::size_t at_least;
-  } const readers[] = {{"core/run.cpp", runs, 8}, {"core/import/import.cpp", runs, 25}, {"core/rig.cpp", rigs, 15}, {"core/rig_chain.cpp", rigs, 20}, {"core/rig_gauge.cpp", rigs, 3}};
+  } const readers[] = {{"core/run/run.cpp", runs, 8}, {"core/import/import.cpp", runs, 25}, {"core/rig/rig.cpp", rigs, 15}, {"core/rig/rig_chain.cpp", rigs, 20}, {"core/rig/rig_gauge.cpp", rigs, 3}};
   for (const auto& [source, page, at_least] : readers) {
     const std::vector<std::string> keys = keys_of(source);
     EXPECT_GE(keys.size(), at_least) << source << ": otherwise this looks for nothing";

@@ -8,7 +8,7 @@
 #include <utility>
 #include <vector>
 
-#include "core/text_file.h"
+#include "core/files/text_file.h"
 #include "tests/commands/run_unrig.h"
 #include "tests/support/sample_data.h"
 

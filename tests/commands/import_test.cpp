@@ -6,8 +6,8 @@
 #include <cstdlib>
 #include <filesystem>
 
-#include "core/run.h"
-#include "core/text_file.h"
+#include "core/run/run.h"
+#include "core/files/text_file.h"
 #include "tests/commands/run_unrig.h"
 #include "tests/support/sample_data.h"
 

@@ -5,7 +5,7 @@
 
 #include <cstdlib>
 
-#include "core/text_file.h"
+#include "core/files/text_file.h"
 #include "tests/commands/run_unrig.h"
 #include "tests/support/sample_data.h"
 

@@ -9,9 +9,9 @@
 
 #include <nlohmann/json.hpp>
 
-#include "core/csv_table.h"
-#include "core/fingerprint.h"
-#include "core/text_file.h"
+#include "core/files/csv_table.h"
+#include "core/rig/fingerprint.h"
+#include "core/files/text_file.h"
 #include "tests/commands/run_unrig.h"
 #include "tests/support/sample_data.h"
 

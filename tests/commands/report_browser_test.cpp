@@ -7,7 +7,7 @@
 #include <cmath>
 #include <cstdlib>
 
-#include "core/text_file.h"
+#include "core/files/text_file.h"
 #include "tests/commands/report_results.h"
 
 namespace unrig {

@@ -10,7 +10,7 @@
 
 #include <fmt/format.h>
 
-#include "core/text_file.h"
+#include "core/files/text_file.h"
 #include "tests/commands/report_results.h"
 
 namespace unrig {

@@ -11,8 +11,8 @@
 
 #include <nlohmann/json.hpp>
 
-#include "core/run.h"
-#include "core/text_file.h"
+#include "core/run/run.h"
+#include "core/files/text_file.h"
 #include "tests/commands/run_unrig.h"
 #include "tests/support/sample_data.h"
 

@@ -5,7 +5,7 @@
 #include <filesystem>
 #include <string>
 
-#include "core/run.h"
+#include "core/run/run.h"
 #include "tests/commands/unrig.h"
 
 namespace unrig::test {

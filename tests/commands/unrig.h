@@ -4,7 +4,7 @@
 #include <cstdlib>
 #include <string>
 
-#include "core/text_file.h"
+#include "core/files/text_file.h"
 #include "tests/commands/unrig_binary.h"
 #include "tests/support/temporary_directory.h"
 

@@ -7,7 +7,7 @@
 #include <filesystem>
 #include <sstream>
 
-#include "core/text_file.h"
+#include "core/files/text_file.h"
 #include "tests/commands/run_unrig.h"
 #include "tests/support/sample_data.h"
 

@@ -10,10 +10,10 @@
 #include <numbers>
 #include <random>
 
-#include "core/feedback_force.h"
-#include "core/rig.h"
-#include "core/structure.h"
-#include "core/wagner.h"
+#include "core/propagate/feedback_force.h"
+#include "core/rig/rig.h"
+#include "core/rig/structure.h"
+#include "core/model/wagner.h"
 #include "tests/support/sample_data.h"
 
 namespace unrig {

@@ -4,8 +4,8 @@
 #include <limits>
 #include <stdexcept>
 
-#include "core/motion.h"
-#include "core/response.h"
+#include "core/run/motion.h"
+#include "core/propagate/response.h"
 
 namespace unrig {
 namespace {

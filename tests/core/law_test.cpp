@@ -8,8 +8,8 @@
 #include <cmath>
 #include <random>
 
-#include "core/feedback_force.h"
-#include "core/nonlinear_response.h"
+#include "core/propagate/feedback_force.h"
+#include "core/propagate/nonlinear_response.h"
 #include "tests/support/sample_data.h"
 #include "tests/support/slope_check.h"
 

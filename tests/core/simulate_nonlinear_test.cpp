@@ -7,7 +7,7 @@
 #include <functional>
 #include <numbers>
 
-#include "core/simulate.h"
+#include "core/model/simulate.h"
 #include "tests/support/sample_data.h"
 
 namespace unrig {

@@ -9,11 +9,11 @@
 #include <string>
 #include <vector>
 
-#include "core/csv_table.h"
-#include "core/error.h"
-#include "core/fingerprint.h"
-#include "core/text_file.h"
-#include "core/wagner.h"
+#include "core/files/csv_table.h"
+#include "core/files/error.h"
+#include "core/rig/fingerprint.h"
+#include "core/files/text_file.h"
+#include "core/model/wagner.h"
 #include "correct/corrected_files.h"
 #include "tests/correct/null_campaign.h"
 #include "tests/support/temporary_directory.h"

@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-#include "core/csv_table.h"
+#include "core/files/csv_table.h"
 
 namespace unrig {
 namespace {

@@ -9,7 +9,7 @@
 #include <nlohmann/json.hpp>
 #include <numbers>
 
-#include "core/text_file.h"
+#include "core/files/text_file.h"
 #include "tests/correct/null_campaign.h"
 
 namespace unrig {

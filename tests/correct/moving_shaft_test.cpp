@@ -6,8 +6,8 @@
 #include <random>
 #include <string>
 
-#include "core/indicial_table.h"
-#include "core/simulate.h"
+#include "core/model/indicial_table.h"
+#include "core/model/simulate.h"
 #include "correct/corrected_files.h"
 #include "tests/correct/null_campaign.h"
 #include "tests/support/temporary_directory.h"

@@ -2,7 +2,7 @@
 #include <string>
 #include <vector>
 
-#include "core/text_file.h"
+#include "core/files/text_file.h"
 #include "correct/correct.h"
 #include "fit/fit.h"
 #include "tests/support/csv_column.h"

@@ -5,7 +5,7 @@
 #include <numbers>
 #include <random>
 
-#include "core/simulate.h"
+#include "core/model/simulate.h"
 #include "tests/correct/null_campaign.h"
 
 namespace unrig::test {

@@ -8,11 +8,11 @@
 #include <random>
 #include <string>
 
-#include "core/csv_table.h"
-#include "core/indicial_table.h"
-#include "core/simulate.h"
+#include "core/files/csv_table.h"
+#include "core/model/indicial_table.h"
+#include "core/model/simulate.h"
 #include "correct/corrected_files.h"
-#include "correct/modal_load.h"
+#include "correct/modal/modal_load.h"
 #include "tests/correct/null_campaign.h"
 
 namespace unrig {
@@ -36,7 +36,7 @@ FittedRig true_rig() {
   return fit;
 }
 
-/// Amplitudes of the response's exponentials over the share that the prior leaves each (correct/prior.h), out of its values: a sum of squares that a heavier weight makes smaller.
+/// Amplitudes of the response's exponentials over the share that the prior leaves each (correct/estimate/prior.h), out of its values: a sum of squares that a heavier weight makes smaller.
 double size_of_amplitudes(const IndicialResponse& response, const VectorXd& value) {
   const VectorXd rates = spread_rates(5 * response.semichords.tail(1)[0]);
   const MatrixXd decays = (-response.semichords * rates.transpose()).array().exp();

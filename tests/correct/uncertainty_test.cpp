@@ -5,12 +5,12 @@
 #include <random>
 #include <string>
 
-#include "core/csv_table.h"
-#include "core/indicial_table.h"
-#include "core/simulate.h"
-#include "core/text_file.h"
+#include "core/files/csv_table.h"
+#include "core/model/indicial_table.h"
+#include "core/model/simulate.h"
+#include "core/files/text_file.h"
 #include "correct/corrected_files.h"
-#include "correct/uncertainty_budget.h"
+#include "correct/estimate/uncertainty_budget.h"
 #include "tests/correct/null_campaign.h"
 
 namespace unrig {
@@ -82,7 +82,7 @@ TEST(Indicial, ResponseOfOneRunPredictsTheReadingOfOthers) {
   const CorrectResult from = correct(test::null_problem("step_a"));
   const test::TemporaryDirectory directory;
   const TabulatedIndicial table = read_indicial(directory.file("indicial.csv", to_indicial_csv(from)));
-  EXPECT_LT(table.miss, 1e-4);  // what rates no slower than the table is long promise (core/indicial_table.h); the estimate has slower ones
+  EXPECT_LT(table.miss, 1e-4);  // what rates no slower than the table is long promise (core/model/indicial_table.h); the estimate has slower ones
   ASSERT_TRUE(table.slope);
   EXPECT_NEAR(*table.slope, from.slope, 1e-4);
 

@@ -1,6 +1,6 @@
 #include <cstdio>
 
-#include "core/text_file.h"
+#include "core/files/text_file.h"
 #include "fit/fit.h"
 #include "fit/fit_files.h"
 

@@ -1,6 +1,6 @@
 #include <cstdio>
 
-#include "core/structure.h"
+#include "core/rig/structure.h"
 
 // frequencies RIG: below 100 Hz, in air and in still water.
 int main(int, char** argv) {

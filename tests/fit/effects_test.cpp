@@ -4,9 +4,9 @@
 #include <map>
 #include <nlohmann/json.hpp>
 
-#include "core/text_file.h"
+#include "core/files/text_file.h"
 #include "fit/fit.h"
-#include "fit/run_residual.h"
+#include "fit/likelihood/run_residual.h"
 
 namespace unrig {
 namespace {

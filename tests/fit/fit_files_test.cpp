@@ -7,7 +7,7 @@
 
 #include <nlohmann/json.hpp>
 
-#include "core/error.h"
+#include "core/files/error.h"
 #include "tests/support/sample_data.h"
 #include "tests/support/temporary_directory.h"
 

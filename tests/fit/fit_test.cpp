@@ -12,10 +12,10 @@
 
 #include <nlohmann/json.hpp>
 
-#include "core/error.h"
-#include "core/simulate.h"
-#include "core/text_file.h"
-#include "fit/effect_search.h"
+#include "core/files/error.h"
+#include "core/model/simulate.h"
+#include "core/files/text_file.h"
+#include "fit/search/effect_search.h"
 #include "fit/fit_files.h"
 #include "tests/support/sample_data.h"
 #include "tests/support/shared_data.h"

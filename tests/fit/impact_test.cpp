@@ -4,10 +4,10 @@
 #include <algorithm>
 #include <cmath>
 
-#include "fit/modal_start.h"
-#include "fit/no_worse_than_start.h"
-#include "fit/readings_noise.h"
-#include "fit/unfitted_modes.h"
+#include "fit/search/modal_start.h"
+#include "fit/search/no_worse_than_start.h"
+#include "fit/likelihood/readings_noise.h"
+#include "fit/uncertainty/unfitted_modes.h"
 #include "tests/fit/impact_cases.h"
 
 // Impact tests: a hammer whose force is measured with noise. Before that noise counted, and the starts were those of the spectra, four of ten fits from the truth ended with masses of 200 kg or 4e-6 kg.

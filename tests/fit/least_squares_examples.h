@@ -8,7 +8,7 @@
 #include <utility>
 #include <vector>
 
-#include "fit/least_squares.h"
+#include "fit/solver/least_squares.h"
 
 /// Small problems with known answers.
 namespace unrig::test {

@@ -2,7 +2,7 @@
 
 #include <utility>
 
-#include "fit/run_linearised.h"
+#include "fit/likelihood/run_linearised.h"
 #include "tests/fit/run_cases.h"
 
 // Rests that go on for long after everything has died out: RunResidual looks at them in few numbers.

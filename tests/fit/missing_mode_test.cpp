@@ -9,8 +9,8 @@
 #include <numbers>
 #include <random>
 
-#include "core/error.h"
-#include "core/simulate.h"
+#include "core/files/error.h"
+#include "core/model/simulate.h"
 #include "fit/diagnose/diagnose.h"
 #include "fit/fit.h"
 #include "tests/support/sample_data.h"

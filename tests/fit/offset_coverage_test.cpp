@@ -7,13 +7,13 @@
 #include <utility>
 #include <vector>
 
-#include "core/gauge_lever.h"
-#include "core/simulate.h"
+#include "core/rig/gauge_lever.h"
+#include "core/model/simulate.h"
 #include "fit/fit.h"
-#include "fit/joint_problem.h"
-#include "fit/run_residual.h"
-#include "fit/uncertainty.h"
-#include "fit/undetermined.h"
+#include "fit/likelihood/joint_problem.h"
+#include "fit/likelihood/run_residual.h"
+#include "fit/uncertainty/uncertainty.h"
+#include "fit/uncertainty/undetermined.h"
 #include "tests/support/sample_data.h"
 
 namespace unrig {

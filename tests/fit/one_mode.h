@@ -4,7 +4,7 @@
 #include <random>
 #include <string>
 
-#include "core/aeroelastic_model.h"
+#include "core/model/aeroelastic_model.h"
 
 // A rig that is known as one mode, and free decays of it that no part of the program has made.
 

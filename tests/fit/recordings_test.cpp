@@ -5,7 +5,7 @@
 #include <Eigen/LU>
 #include <cmath>
 
-#include "core/simulate.h"
+#include "core/model/simulate.h"
 #include "fit/fit.h"
 #include "tests/support/band.h"
 #include "tests/support/shared_data.h"

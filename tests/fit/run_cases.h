@@ -11,9 +11,9 @@
 #include <string>
 #include <vector>
 
-#include "core/exact_step.h"
-#include "core/run_inputs.h"
-#include "fit/run_residual.h"
+#include "core/propagate/exact_step.h"
+#include "core/model/run_inputs.h"
+#include "fit/likelihood/run_residual.h"
 #include "tests/support/sample_data.h"
 
 // Runs of every kind, simulated with small noise, and their least-squares problem without any economy.

@@ -8,7 +8,7 @@
 
 #include "fit/diagnose/diagnosis_files.h"
 #include "fit/diagnose/selection.h"
-#include "fit/out_of_proportion.h"
+#include "fit/uncertainty/out_of_proportion.h"
 #include "tests/support/sample_data.h"
 
 namespace unrig {

@@ -11,8 +11,8 @@
 
 #include <nlohmann/json.hpp>
 
-#include "core/text_file.h"
-#include "fit/apparent_mass.h"
+#include "core/files/text_file.h"
+#include "fit/apparent_mass/apparent_mass.h"
 #include "fit/fit.h"
 #include "tests/studies/campaign_maker.h"
 #include "tests/support/sample_data.h"

@@ -1,6 +1,6 @@
 // Rig files: a rig or InputError.
-#include "core/error.h"
-#include "core/rig.h"
+#include "core/files/error.h"
+#include "core/rig/rig.h"
 #include "tests/fuzz/on_disk.h"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {

@@ -2,8 +2,8 @@
 #include <cstdint>
 #include <string_view>
 
-#include "core/error.h"
-#include "core/run.h"
+#include "core/files/error.h"
+#include "core/run/run.h"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   try {

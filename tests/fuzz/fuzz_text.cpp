@@ -4,7 +4,7 @@
 #include <cstdlib>
 #include <string>
 
-#include "core/error.h"
+#include "core/files/error.h"
 #include "core/import/delimited.h"
 #include "core/import/lvm.h"
 

@@ -4,9 +4,9 @@
 #include <numbers>
 #include <stdexcept>
 
-#include "core/simulate.h"
-#include "core/smooth_ramp.h"
-#include "fit/diagnose/trial_campaign.h"
+#include "core/model/simulate.h"
+#include "core/numerics/smooth_ramp.h"
+#include "fit/trial/trial_campaign.h"
 #include "tests/support/sample_data.h"
 
 namespace unrig::studies {

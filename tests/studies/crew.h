@@ -5,8 +5,8 @@
 
 #include <fmt/format.h>
 
-#include "core/command.h"
-#include "core/in_parallel.h"
+#include "core/files/command.h"
+#include "core/numerics/in_parallel.h"
 
 namespace unrig::studies {
 

@@ -1,5 +1,5 @@
 // Does `unrig fit --effect` arrive at nonlinear effects, from weak to strong? Simulates campaigns of the sample rig with one effect hidden at a random size
-// (fit/diagnose/trial_campaign.h), fits them with that effect named, and counts how often the fit finds it, says that it has not, or is wrong without saying so.
+// (fit/trial/trial_campaign.h), fits them with that effect named, and counts how often the fit finds it, says that it has not, or is wrong without saying so.
 // Exit status 1 where a fit is wrong in silence.
 
 #include <CLI/CLI.hpp>
@@ -12,7 +12,7 @@
 #include <random>
 
 #include "core/effects/effect.h"
-#include "fit/diagnose/trial_campaign.h"
+#include "fit/trial/trial_campaign.h"
 #include "fit/fit.h"
 #include "tests/studies/crew.h"
 #include "tests/studies/outcome.h"

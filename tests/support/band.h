@@ -3,7 +3,7 @@
 #include <cmath>
 #include <numbers>
 
-#include "core/run.h"
+#include "core/run/run.h"
 
 namespace unrig::test {
 

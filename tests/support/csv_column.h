@@ -2,8 +2,8 @@
 #include <stdexcept>
 #include <string>
 
-#include "core/csv_table.h"
-#include "core/text_file.h"
+#include "core/files/csv_table.h"
+#include "core/files/text_file.h"
 
 namespace unrig::test {
 

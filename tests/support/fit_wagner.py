@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Best approximations of Wagner's function by decaying exponentials: where the constants of core/wagner.cpp come from.
+"""Best approximations of Wagner's function by decaying exponentials: where the constants of core/model/wagner.cpp come from.
 
     python3 tests/support/fit_wagner.py          # needs numpy and scipy; about 10 s
 
@@ -23,7 +23,7 @@ from scipy.special import i0, i1, k0, k1
 
 POLES = {"within_1e4": 6, "within_1e6": 13}
 
-# f(s) by the trapezoidal rule in ln x, as in core/wagner.cpp.
+# f(s) by the trapezoidal rule in ln x, as in core/model/wagner.cpp.
 STEP = 0.18
 NODE = np.exp(STEP * np.arange(-190, 17))
 WEIGHT = STEP / (NODE * ((k0(NODE) - k1(NODE)) ** 2 + np.pi**2 * (i0(NODE) + i1(NODE)) ** 2))

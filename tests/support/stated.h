@@ -3,9 +3,9 @@
 
 #include <string>
 
-#include "core/rig.h"
-#include "core/run.h"
-#include "core/text_file.h"
+#include "core/rig/rig.h"
+#include "core/run/run.h"
+#include "core/files/text_file.h"
 #include "tests/support/temporary_directory.h"
 
 namespace unrig::test {

@@ -6,7 +6,7 @@
 #include <Eigen/LU>
 #include <numbers>
 
-#include "core/rigid_system.h"
+#include "core/model/rigid_system.h"
 #include "tests/verification/seed.h"
 
 namespace unrig::seed {

@@ -6,9 +6,9 @@
 #include <cmath>
 #include <numbers>
 
-#include "core/exact_step.h"
-#include "core/motion.h"
-#include "core/rigid_system.h"
+#include "core/propagate/exact_step.h"
+#include "core/run/motion.h"
+#include "core/model/rigid_system.h"
 #include "tests/verification/seed.h"
 
 namespace unrig::seed {
@@ -155,7 +155,7 @@ TEST_F(Duhamel, SumsScaleAndShift) {
 
 TEST_F(Duhamel, AnyMotionIsAnIntegralOverIdealSteps) {
   // y(t) = Int h(t - t') p'(t') dt' + impulse p' + doublet p'', h the smooth part of the ideal step: Eq. 2.8 for the whole rig. Tests the
-  // delta functions of core/ideal_step.h, which no record can show.
+  // delta functions of core/model/ideal_step.h, which no record can show.
   const Motion motion = step_motion().motion;
   const MatrixXd direct = motion_response(system_, motion, dt_);
   const IdealStep step = ideal_step(system_, 1);

@@ -1,12 +1,12 @@
 // Virtual work (Eq. A.1 to A.3) against the printed flexibility matrices: sample_data/seed/rig_from_drawings.toml against rig.toml.
-// The integrals themselves are checked against closed forms in tests/core/beam_flexibility_test.cpp.
+// The integrals themselves are checked against closed forms in tests/core/rig/beam_flexibility_test.cpp.
 
 #include <gtest/gtest.h>
 
 #include <algorithm>
 #include <cmath>
 
-#include "core/beam_flexibility.h"
+#include "core/rig/beam_flexibility.h"
 #include "tests/verification/seed.h"
 
 namespace unrig::seed {
@@ -80,7 +80,7 @@ TEST(Drawings, ReproduceThePrintedTorsionalFlexibility) {
 }
 
 TEST(Drawings, TwoEigenvaluesOfThePrintedMatrixAreRounding) {
-  // What a flexibility printed to four digits cannot determine: unrig leaves these modes out and warns (core/flexibility.h).
+  // What a flexibility printed to four digits cannot determine: unrig leaves these modes out and warns (core/rig/flexibility.h).
   EXPECT_EQ(chain_modes(seed::rig().normal).omega.size(), 15);
   EXPECT_EQ(chain_modes(rig_from_drawings().normal).omega.size(), 17);
   EXPECT_EQ(seed::rig().warnings.size(), 1u);

@@ -7,7 +7,7 @@
 #include <cmath>
 #include <complex>
 
-#include "core/dual_matrix.h"
+#include "core/numerics/dual_matrix.h"
 #include "tests/verification/seed.h"
 
 namespace unrig::seed {

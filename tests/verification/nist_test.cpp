@@ -11,8 +11,8 @@
 #include <string>
 #include <vector>
 
-#include "fit/identifiability.h"
-#include "fit/least_squares.h"
+#include "fit/uncertainty/identifiability.h"
+#include "fit/solver/least_squares.h"
 #include "tests/support/shared_data.h"
 
 namespace unrig {

@@ -9,8 +9,8 @@
 #include <cmath>
 #include <random>
 
-#include "core/rigid_system.h"
-#include "core/spectrum.h"
+#include "core/model/rigid_system.h"
+#include "core/numerics/spectrum.h"
 #include "fit/fit.h"
 #include "tests/verification/seed.h"
 

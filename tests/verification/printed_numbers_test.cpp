@@ -7,7 +7,7 @@
 #include <complex>
 #include <numbers>
 
-#include "core/rigid_system.h"
+#include "core/model/rigid_system.h"
 #include "tests/verification/seed.h"
 
 namespace unrig::seed {

@@ -1,12 +1,12 @@
-// The exact propagator of core/exact_step.h against an integrator that knows nothing of matrix exponentials, and its derivatives against
+// The exact propagator of core/propagate/exact_step.h against an integrator that knows nothing of matrix exponentials, and its derivatives against
 // differences; both judged by their slope: halve the step and expect the order.
 
 #include <gtest/gtest.h>
 
 #include <cmath>
 
-#include "core/exact_step.h"
-#include "core/response.h"
+#include "core/propagate/exact_step.h"
+#include "core/propagate/response.h"
 #include "tests/verification/seed.h"
 
 namespace unrig::seed {

@@ -7,7 +7,7 @@
 #include <complex>
 #include <numbers>
 
-#include "core/run.h"
+#include "core/run/run.h"
 
 namespace unrig::seed {
 namespace {

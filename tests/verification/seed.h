@@ -3,9 +3,9 @@
 #include <string>
 #include <vector>
 
-#include "core/aeroelastic_model.h"
-#include "core/ideal_step.h"
-#include "core/motion.h"
+#include "core/model/aeroelastic_model.h"
+#include "core/model/ideal_step.h"
+#include "core/run/motion.h"
 
 /// What the verification tests share about "Effect of Aeroelasticity in Tow Tank Strain Gauge Measurements on a NACA 0015 Airfoil" (Ohio
 /// University), here the seed: its printed numbers, its equations as it wrote them, and its rig in unrig. Inch, pound mass, second.

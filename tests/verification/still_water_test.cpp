@@ -7,8 +7,8 @@
 #include <numbers>
 #include <vector>
 
-#include "core/exact_step.h"
-#include "core/rigid_system.h"
+#include "core/propagate/exact_step.h"
+#include "core/model/rigid_system.h"
 #include "tests/verification/seed.h"
 
 namespace unrig::seed {

@@ -6,7 +6,7 @@
 
 #include <string>
 
-#include "core/text_file.h"
+#include "core/files/text_file.h"
 
 namespace unrig::seed {
 namespace {

@@ -1,0 +1,217 @@
+#include "core/model/simulate.h"
+
+#include <fmt/format.h>
+
+#include <Eigen/LU>
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <numeric>
+#include <stdexcept>
+#include <vector>
+
+#include "core/propagate/exact_step.h"
+#include "core/rig/gauge_lever.h"
+#include "core/model/ideal_step.h"
+#include "core/run/motion.h"
+#include "core/propagate/nonlinear_response.h"
+#include "core/propagate/response.h"
+#include "core/model/rigid_system.h"
+#include "core/model/run_inputs.h"
+
+namespace unrig {
+namespace {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+struct Output {
+  std::string name, unit;
+};
+
+/// The gauge and every sensor, whether the run has recorded them or not.
+std::vector<Output> outputs_of(const Rig& rig, const Run& run) {
+  std::vector<Output> outputs;
+  if (rig.is_modal() && rig.modal.front().gauge_gain != 0) outputs.push_back({"gauge", rig.modal.front().gauge_unit});
+  if (rig.gauge_element > 0) outputs.push_back({"gauge", "N"});
+  for (const Sensor& sensor : rig.sensors) {
+    const Channel* recorded = run.find(sensor.column);
+    outputs.push_back({sensor.column, recorded ? recorded->unit : sensor.unit});
+  }
+  return outputs;
+}
+
+/// The column of that name, new or instead of the recorded one.
+void put(Run& run, const std::string& name, const std::string& unit, const VectorXd& value) {
+  const auto found = std::find_if(run.channels.begin(), run.channels.end(), [&](const Channel& c) { return c.name == name; });
+  Channel& channel = found == run.channels.end() ? run.channels.emplace_back() : *found;
+  // A recorded column in another unit of the same kind ("lbf") keeps it; run_text leaves it where a calibration lay between.
+  const bool keeps_unit = found != run.channels.end() && channel.unit == unit;
+  channel.name = name;
+  if (!keeps_unit) channel.file_unit = unit, channel.factor = 1;
+  channel.unit = unit;
+  channel.value = value;
+  channel.missing = 0;
+}
+
+Conditions conditions_for(const SimulateProblem& problem) {
+  Conditions conditions = conditions_of(problem.run);
+  const Run& run = problem.run;
+  const InputError::Place place{run.file, 0};
+  const Rig& rig = problem.model.rig();
+  if (run.kind == RunKind::step && !rig.is_modal()) {
+    const Channel& alpha = run.channel("alpha");
+    for (Index k = 0; k < run.samples(); ++k)
+      if (!std::isfinite(alpha.value[k]))
+        throw InputError(place, fmt::format("alpha has no number at {:.6g} s", run.time(k)),
+                         "wanted the angle of the shaft in every sample", "");
+  }
+  if (run.kind == RunKind::pluck && !problem.release_load)
+    throw InputError(place, "a pluck is let go from somewhere", "wanted the load it is released from", "Give --release-load \"20 N\".");
+  if (run.kind == RunKind::forced) run.channel("force");
+  if (run.kind == RunKind::moved && !conditions.mount) run.channel("mount_acceleration");
+  if (problem.release_load) {
+    if (run.kind == RunKind::step)
+      throw InputError(place, "a release load for a step", "wanted it for a pluck",
+                       "A step starts in the steady state of its first angle.");
+    if (!rig.is_modal() && rig.calibration_element == 0)
+      throw InputError({rig.file, 0}, "the rig has no calibration element for the release load", "wanted [gauge] with calibration_element",
+                       "");
+    conditions.force = true;
+  }
+  return conditions;
+}
+
+MatrixXd inputs_of(const Run& run, const Conditions& conditions) {
+  Conditions recorded = conditions;
+  recorded.force = run.find("force") != nullptr;
+  const MatrixXd measured = run_inputs(run, recorded);
+  if (recorded.force == conditions.force) return measured;
+  MatrixXd input = MatrixXd::Zero(measured.rows(), measured.cols() + 1);
+  input.rightCols(measured.cols()) = measured;
+  return input;
+}
+
+/// States that stay where they are under a constant column of drive: -A^-1 column, over those that are at rest where the rig is.
+VectorXd static_state(const LinearSystem& system, const VectorXd& column) {
+  std::vector<Index> at_rest(static_cast<std::size_t>(system.free_states()));
+  std::iota(at_rest.begin(), at_rest.end(), Index{0});
+  at_rest.insert(at_rest.end(), system.settling.begin(), system.settling.end());
+  VectorXd state = VectorXd::Zero(system.states());
+  state(at_rest) = -MatrixXd(system.A.value(at_rest, at_rest)).partialPivLu().solve(VectorXd(column(at_rest)));
+  return state;
+}
+
+/// A shaft that jumps: between jumps the pitch is constant, at a jump the states jump too.
+MatrixXd jump_response(const LinearSystem& system, const VectorXd& angle, double dt) {
+  const MatrixXd transition = exact_step(system, dt).transition.value;
+  const VectorXd jump = step_jump(system);
+  VectorXd state = VectorXd::Zero(system.states());
+  MatrixXd output(angle.size(), system.C.rows());
+  for (Index k = 0; k < angle.size(); ++k) {
+    if (k > 0) {
+      state = transition * state;
+      if (angle[k] != angle[k - 1]) state += (angle[k] - angle[k - 1]) * jump;
+    }
+    output.row(k) = (system.C.value * state).transpose();
+  }
+  return output;
+}
+
+MatrixXd response_to_pitch(const LinearSystem& system, const VectorXd& angle, double dt, PitchBetweenSamples pitch) {
+  if (pitch == PitchBetweenSamples::jumps) return jump_response(system, angle, dt);
+  return motion_response(system, interpolated_motion(angle, dt), dt);
+}
+
+/// Where the run starts: static deflection, signals, and the spline's acceleration.
+VectorXd start_of(const SimulateProblem& problem, const LinearSystem& system, const Motion& motion) {
+  VectorXd start = VectorXd::Zero(system.states());
+  if (problem.release_load) start = static_state(system, *problem.release_load * system.B.value.col(0));
+  if (problem.signals.size() > 0) {
+    if (problem.signals.size() != static_cast<Index>(system.exogenous.size()))
+      throw std::invalid_argument(fmt::format("{} values for the {} signal states of the effects", problem.signals.size(), system.exogenous.size()));
+    start(system.exogenous) = problem.signals;
+  }
+  if (motion.jerk.size() > 0) start.segment(system.motion, 3) << motion.angle[0], motion.rate[0], motion.acceleration[0];
+  return start;
+}
+
+/// Of motion, measured inputs and start in one pass: with nonlinear effects they do not add up. Jumps are added by themselves, to a linear system.
+MatrixXd response_of(const SimulateProblem& problem, const LinearSystem& system, const Conditions& conditions) {
+  const Run& run = problem.run;
+  const bool jumps = system.motion >= 0 && problem.pitch == PitchBetweenSamples::jumps;
+  if (jumps && !system.feedback.empty())
+    throw InputError({run.file, 0}, "the angle jumps while a nonlinear effect is at work", "wanted only linear effects for ideal steps", "Leave out --jumps, or the effect.");
+  const Motion motion = system.motion >= 0 && !jumps ? interpolated_motion(run.channel("alpha").value, run.dt) : Motion{};
+  const MatrixXd input = inputs_of(run, conditions);
+  const VectorXd start = start_of(problem, system, motion);
+  const ExactStep step = step_to_follow(system, run.dt);
+  if (!system.feedback.empty()) {
+    const NonlinearResponse response = follow(system, step, problem.theta, {start, motion.jerk, input, MatrixXd(system.states(), 0), {}}, run.samples(), Partials::none);
+    if (!response.finite) throw NoAnswer(run.file + ": the response with its nonlinear effects grows beyond all bounds");
+    return response.output;
+  }
+  MatrixXd output = drive(system, step, DualMatrix(start), run.samples(), motion.jerk, input.cols() > 0 ? input : MatrixXd(), Partials::none).output;
+  if (jumps) output += jump_response(system, run.channel("alpha").value, run.dt);
+  return output;
+}
+
+/// Outputs in the steady state of the first angle.
+VectorXd steady_reading(const SimulateProblem& problem, const LinearSystem& system, double angle) {
+  VectorXd reading = angle * system.C.value.col(system.motion);
+  reading += system.C.value * static_state(system, angle * system.A.value.col(system.motion));
+  const Rig& rig = problem.model.rig();
+  if (problem.steady_normal_force && rig.gauge_element > 0)
+    reading[0] = *problem.steady_normal_force * gauge_reading_of_unit_coefficient(rig, problem.run.density, problem.run.speed);
+  return reading;
+}
+
+void add_rigid_loads(const SimulateProblem& problem, const Conditions& conditions, SimulateResult& result) {
+  const Run& run = problem.run;
+  const Rig& rig = problem.model.rig();
+  const LinearSystem rigid = rigid_system(problem.model, conditions, problem.theta);
+  const VectorXd& angle = run.channel("alpha").value;
+  const MatrixXd load = response_to_pitch(rigid, angle, run.dt, problem.pitch);
+  const double span = rig.strip_length * static_cast<double>(rig.submerged.size());
+  const double coefficient = problem.steady_normal_force.value_or(problem.theta[problem.model.index("normal_force_slope")] * angle[0]);
+  const double steady = coefficient * run.density * run.speed * run.speed * rig.semichord() * span;
+  for (const Index c : {0, 1}) {
+    result.simulated.push_back(rigid.outputs[static_cast<std::size_t>(c)]);
+    put(result.run, result.simulated.back(), "N", load.col(c).array() + steady);
+  }
+}
+
+void warn_of_noise(const VectorXd& angle, std::vector<std::string>& warnings) {
+  // Ten printed digits leave far less than a thousandth of the motion; a recording leaves more.
+  const double noise = noise_level(angle), range = angle.maxCoeff() - angle.minCoeff();
+  if (noise > 1e-3 * range)
+    warnings.push_back(
+        fmt::format("alpha carries noise of {:.2g} deg, whose second derivative becomes load; simulate needs the motion itself",
+                    noise * 180 / std::numbers::pi));
+}
+
+}  // namespace
+
+SimulateResult simulate(const SimulateProblem& problem) {
+  const Run& run = problem.run;
+  const Conditions conditions = conditions_for(problem);
+  const std::vector<Output> outputs = outputs_of(problem.model.rig(), run);
+  SimulateResult result;
+  for (const Output& output : outputs) result.simulated.push_back(output.name);
+  LinearSystem system = problem.model.system(conditions, problem.theta, result.simulated);
+  for (DualMatrix* m : {&system.A, &system.B, &system.C, &system.D}) m->partial.clear();  // nobody asks for derivatives
+
+  result.run = run;
+  MatrixXd reading = response_of(problem, system, conditions);
+  if (system.motion >= 0) {
+    const VectorXd& angle = run.channel("alpha").value;
+    if (problem.pitch == PitchBetweenSamples::spline) warn_of_noise(angle, result.warnings);
+    reading.rowwise() += steady_reading(problem, system, angle[0]).transpose();
+  }
+  for (std::size_t c = 0; c < outputs.size(); ++c) put(result.run, outputs[c].name, outputs[c].unit, reading.col(static_cast<Index>(c)));
+  if (system.motion >= 0) add_rigid_loads(problem, conditions, result);
+  return result;
+}
+
+}  // namespace unrig

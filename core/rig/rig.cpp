@@ -1,0 +1,271 @@
+#include "core/rig/rig.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <filesystem>
+#include <utility>
+
+#include "core/rig/rig_chain.h"
+#include "core/rig/rig_gauge.h"
+#include "core/rig/stated_errors.h"
+#include "core/files/text_file.h"
+#include "core/files/text_kind.h"
+#include "core/files/toml_table.h"
+#include "core/files/units.h"
+
+namespace unrig {
+namespace {
+
+using Eigen::Index;
+
+constexpr std::array sensor_kinds = {std::pair{"displacement", SensorKind::displacement}, std::pair{"velocity", SensorKind::velocity},
+                                     std::pair{"acceleration", SensorKind::acceleration}, std::pair{"twist", SensorKind::twist},
+                                     std::pair{"twist_rate", SensorKind::twist_rate}};
+
+void check_rig_version(const TomlTable& file, const std::string& path) {
+  if (!file.has("unrig_rig")) {
+    throw InputError({path, 1}, "the file does not say that it is a rig file", "wanted the line `unrig_rig = 1` at its head", "");
+  }
+  if (file.integer("unrig_rig") != 1) {
+    file.fail("unrig_rig", fmt::format("unrig_rig is {}", file.integer("unrig_rig")), "wanted 1, the only version of the format there is");
+  }
+}
+
+int element_number(const TomlTable& table, std::string_view key, Index elements) {
+  const int number = table.integer(key);
+  if (number < 1 || number > elements) {
+    table.fail(key, fmt::format("{} is {}", table.full_name(key), number), fmt::format("wanted an element from 1 to {}", elements));
+  }
+  return number;
+}
+
+// ------------------------------------------------------------------------------------------------------ structure
+
+void take_section(const TomlTable& section, Rig& rig) {
+  section.allow_only({"chord", "pitch_axis", "chord_std", "chord_std_percent", "pitch_axis_std", "pitch_axis_std_percent"});
+  rig.chord = section.positive_quantity("chord", "m");
+  rig.pitch_axis = section.number("pitch_axis");
+  if (rig.pitch_axis < 0 || rig.pitch_axis > 1) {
+    section.fail("pitch_axis", fmt::format("section.pitch_axis is {}", rig.pitch_axis),
+                 "wanted a fraction of the chord from 0, the leading edge, to 1, the trailing edge");
+  }
+}
+
+void take_stations(const TomlTable& normal, Rig& rig) {
+  rig.station = normal.quantities("station", "m");
+  if (rig.station.size() == 0) normal.fail("station", "normal.station has no values", "wanted one element at least");
+  double inboard = 0;
+  for (Index k = 0; k < rig.station.size(); ++k) {
+    if (!(rig.station[k] > inboard)) {
+      normal.fail("station", fmt::format("normal.station of element {} is {:.6g} m, after {:.6g} m", k + 1, rig.station[k], inboard),
+                  "wanted distances from the clamp that increase");
+    }
+    inboard = rig.station[k];
+  }
+}
+
+void take_chains(const TomlTable& file, Rig& rig) {
+  const TomlTable normal = file.table("normal");
+  const TomlTable torsion = file.table("torsion");
+  take_stations(normal, rig);
+  rig.normal = read_normal_chain(normal, rig.station, rig.warnings);
+  rig.mass_centre = normal.quantities("mass_centre", "m", rig.station.size());
+  rig.torsion = read_torsion_chain(torsion, normal, rig.warnings);
+  rig.rigid_from = element_number(torsion, "rigid_from", std::min(rig.torsion.inertia.size(), rig.station.size()));
+}
+
+void take_submerged(const TomlTable& submerged, Rig& rig) {
+  submerged.allow_only({"elements", "strip_length", "strip_length_std", "strip_length_std_percent"});
+  rig.strip_length = submerged.positive_quantity("strip_length", "m");
+  rig.submerged = submerged.integers("elements");
+  int before = 0;
+  for (const int element : rig.submerged) {
+    if (element <= before || element > rig.station.size()) {
+      submerged.fail("elements", fmt::format("submerged.elements holds {} after {}", element, before),
+                     fmt::format("wanted increasing elements from 1 to {}", rig.station.size()));
+    }
+    before = element;
+  }
+}
+
+void take_gauge(const TomlTable& gauge, Rig& rig) {
+  gauge.allow_only({"element", "calibration_element", "calibration_uncertainty", "lowpass", "response", "delay"});
+  rig.gauge_element = element_number(gauge, "element", rig.station.size());
+  rig.calibration_element = element_number(gauge, "calibration_element", rig.station.size());
+  if (rig.calibration_element <= rig.gauge_element) {
+    gauge.fail("calibration_element",
+               fmt::format("the dead weights hung at element {}, the gauge sits at element {}", rig.calibration_element, rig.gauge_element),
+               "wanted gauge.calibration_element outboard of gauge.element", "Weights inboard of the bridge do not bend it.");
+  }
+  take_gauge_channel(gauge, rig);
+}
+
+SensorKind sensor_kind(const TomlTable& sensor) {
+  const std::string text = sensor.text("reads");
+  for (const auto& [name, kind] : sensor_kinds) {
+    if (text == name) return kind;
+  }
+  sensor.fail("reads", fmt::format("{} is \"{}\"", sensor.full_name("reads"), text),
+              "wanted \"displacement\", \"velocity\", \"acceleration\", \"twist\" or \"twist_rate\"");
+}
+
+const char* quantity_unit(SensorKind kind) {
+  switch (kind) {
+    case SensorKind::displacement: return "m";
+    case SensorKind::velocity: return "m/s";
+    case SensorKind::acceleration: return "m/s^2";
+    case SensorKind::twist: return "rad";
+    case SensorKind::twist_rate: return "rad/s";
+  }
+  return "";
+}
+
+/// A plain number, or number and unit: "0.5 V/m" is the gain of a column in volts.
+void take_sensor_gain(const TomlTable& table, Sensor& sensor) {
+  sensor.unit = quantity_unit(sensor.reads);
+  if (table.has_text("gain")) {
+    const InputError::Place place = table.place("gain");
+    const std::string name = table.full_name("gain");
+    const Measure measure = split_quantity(table.text("gain"), place, name);
+    sensor.gain = unit_scale(measure.unit, si_unit(measure.unit, place, name), place, name)(measure.value);
+    sensor.unit = si_unit(fmt::format("({}).({})", measure.unit, sensor.unit), place, name);
+  } else {
+    sensor.gain = table.number_or("gain", 1);
+  }
+  if (sensor.gain == 0) table.fail("gain", fmt::format("{} is 0", table.full_name("gain")), "wanted a gain that is not zero");
+}
+
+/// Sensors of a rig of elements say at which; a rig known only as modes says it mode by mode (`sensor_shape`).
+void take_sensors(const TomlTable& file, Rig& rig, bool of_elements) {
+  for (const TomlTable& table : file.tables("sensor")) {
+    if (!of_elements && table.has("element"))
+      table.fail("element", fmt::format("{} stands beside [[modal]], which has no elements", table.full_name("element")), "wanted where the sensor sits as sensor_shape of each [[modal]]");
+    table.allow_only({"column", "reads", "element", "gain"});
+    Sensor sensor;
+    sensor.column = table.text("column");
+    sensor.reads = sensor_kind(table);
+    const bool turns = sensor.reads == SensorKind::twist || sensor.reads == SensorKind::twist_rate;
+    if (of_elements) sensor.element = element_number(table, "element", turns ? rig.torsion.inertia.size() : rig.station.size());
+    take_sensor_gain(table, sensor);
+    const auto same = [&sensor](const Sensor& other) { return other.column == sensor.column; };
+    if (std::any_of(rig.sensors.begin(), rig.sensors.end(), same)) {
+      table.fail("column", fmt::format("two sensors name the column \"{}\"", sensor.column), "wanted one sensor per column");
+    }
+    rig.sensors.push_back(sensor);
+  }
+}
+
+void take_structure(const TomlTable& file, Rig& rig) {
+  file.allow_only({"unrig_rig", "name", "section", "normal", "torsion", "submerged", "gauge", "sensor"});
+  take_section(file.table("section"), rig);
+  take_chains(file, rig);
+  take_submerged(file.table("submerged"), rig);
+  if (file.has("gauge")) take_gauge(file.table("gauge"), rig);
+  if (file.has("sensor")) take_sensors(file, rig, true);
+  if (rig.gauge_element == 0 && rig.sensors.empty()) {
+    throw InputError({rig.file, 0}, "the rig has neither [gauge] nor [[sensor]]", "wanted something that measures", "");
+  }
+}
+
+// ------------------------------------------------------------------------------------------------------ modes only
+
+/// "1000 N/m": what the gauge reads per metre of modal displacement. The unit of the reading is the gain's times metre.
+void take_gauge_gain(const TomlTable& table, ModalMode& mode) {
+  const InputError::Place place = table.place("gauge_gain");
+  const std::string name = table.full_name("gauge_gain");
+  const Measure gain = split_quantity(table.text("gauge_gain"), place, name);
+  si_unit(gain.unit, place, name);  // so that an unknown unit is reported as it stands in the file
+  const std::string reading = fmt::format("({}).(m)", gain.unit);
+  mode.gauge_unit = si_unit(reading, place, name);
+  mode.gauge_gain = unit_scale(reading, mode.gauge_unit, place, name)(gain.value);
+  if (mode.gauge_gain == 0) table.fail("gauge_gain", fmt::format("{} is 0", name), "wanted a gain that is not zero");
+}
+
+/// How the mode moves each sensor, per unit of the modal displacement.
+void take_sensor_shape(const TomlTable& table, std::size_t sensors, ModalMode& mode) {
+  const std::string name = table.full_name("sensor_shape");
+  if (sensors == 0) {
+    if (table.has("sensor_shape")) table.fail("sensor_shape", fmt::format("{} in a rig without [[sensor]]", name), "wanted a [[sensor]] for each of its numbers");
+    return;
+  }
+  if (!table.has("sensor_shape"))
+    table.fail("sensor_shape", fmt::format("{} is missing", name), fmt::format("wanted {} number{}, one per [[sensor]]: what it moves by per unit of the modal displacement", sensors, sensors > 1 ? "s" : ""));
+  mode.sensor_shape = table.numbers("sensor_shape");
+  if (mode.sensor_shape.size() != sensors)
+    table.fail("sensor_shape", fmt::format("{} has {} numbers", name, mode.sensor_shape.size()), fmt::format("wanted {}, one per [[sensor]] in their order", sensors));
+}
+
+/// A mode of a rig with so many sensors.
+ModalMode read_mode(const TomlTable& table, std::size_t sensors) {
+  table.allow_only({"mass", "frequency", "damping_ratio", "gauge_gain", "sensor_shape", "mass_std", "mass_std_percent", "frequency_std", "frequency_std_percent", "damping_ratio_std",
+                    "damping_ratio_std_percent", "gauge_gain_std", "gauge_gain_std_percent"});
+  ModalMode mode;
+  mode.mass = table.positive_quantity("mass", "kg");
+  mode.frequency = table.positive_quantity("frequency", "Hz");
+  mode.damping_ratio = table.number("damping_ratio");
+  if (mode.damping_ratio < 0 || mode.damping_ratio >= 1) {
+    table.fail("damping_ratio", fmt::format("{} is {}", table.full_name("damping_ratio"), mode.damping_ratio),
+               "wanted a fraction of critical damping, at least 0 and below 1");
+  }
+  take_sensor_shape(table, sensors, mode);
+  if (sensors > 0 && !table.has("gauge_gain"))
+    mode.gauge_gain = 0;  // no gauge
+  else
+    take_gauge_gain(table, mode);
+  return mode;
+}
+
+/// What no mode moves measures nothing.
+void check_sensors_move(const TomlTable& file, const Rig& rig) {
+  for (std::size_t s = 0; s < rig.sensors.size(); ++s) {
+    if (std::any_of(rig.modal.begin(), rig.modal.end(), [s](const ModalMode& mode) { return mode.sensor_shape[s] != 0; })) continue;
+    file.fail("modal", fmt::format("number {} of sensor_shape is 0 in every mode", s + 1), fmt::format("wanted one mode at least that moves the sensor \"{}\"", rig.sensors[s].column));
+  }
+}
+
+void take_modes(const TomlTable& file, Rig& rig) {
+  for (const char* key : {"section", "normal", "torsion", "submerged", "gauge"}) {
+    if (file.has(key)) {
+      file.fail(key, fmt::format("[{}] stands beside [[modal]]", key), "wanted either a rig of elements or a rig known only as modes");
+    }
+  }
+  file.allow_only({"unrig_rig", "name", "modal", "sensor"});
+  if (file.has("sensor")) take_sensors(file, rig, false);
+  for (const TomlTable& table : file.tables("modal")) {
+    rig.modal.push_back(read_mode(table, rig.sensors.size()));
+    const auto has_gauge = [](const ModalMode& mode) { return mode.gauge_gain != 0; };
+    if (has_gauge(rig.modal.back()) != has_gauge(rig.modal.front()))
+      table.fail("gauge_gain", fmt::format("{} is {}, that of the first mode is {}", table.full_name("gauge_gain"), has_gauge(rig.modal.back()) ? "given" : "missing", has_gauge(rig.modal.front()) ? "given" : "missing"),
+                 "wanted a gauge_gain in every mode, or in none where there is no gauge");
+    if (rig.modal.back().gauge_unit != rig.modal.front().gauge_unit) {
+      table.fail(
+          "gauge_gain",
+          fmt::format("the gauge reads {} for this mode and {} for the first", rig.modal.back().gauge_unit, rig.modal.front().gauge_unit),
+          "wanted one unit of the reading");
+    }
+  }
+  check_sensors_move(file, rig);
+}
+
+}  // namespace
+
+Rig read_rig(const std::string& path) {
+  const std::string text = read_text(path);
+  refuse_other_kinds(text, path, TextKind::rig);
+  const TomlTable file = TomlTable::parse(text, path, "Text stands in double quotes, a remark begins with #.");
+  check_rig_version(file, path);
+  Rig rig;
+  rig.file = path;
+  rig.name = file.text_or("name", std::filesystem::path(path).stem().string());
+  if (file.has("modal")) {
+    take_modes(file, rig);
+  } else {
+    take_structure(file, rig);
+  }
+  rig.givens = stated_errors(file, rig);
+  return rig;
+}
+
+}  // namespace unrig

@@ -1,0 +1,59 @@
+#pragma once
+#include <Eigen/Core>
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include "fit/search/arrival.h"
+#include "fit/fit.h"
+#include "fit/givens/stated_numbers.h"
+#include "fit/givens/inexact_uncertainty.h"
+
+namespace unrig {
+
+/// A fit of parameters theta and stated numbers g together: least of
+///
+///   chi-square(theta, g) + sum over numbers ((g - stated) / std)^2,
+///
+/// the numbers by way of their independent deviations z (fit/givens/stated_numbers.h). Gauss-Newton steps in both, the rig made anew at each g and theta fitted to it, until the next step is shorter
+/// than 0.05 of its own standard deviations.
+class InexactRig {
+ public:
+  /// `stated` must outlive this.
+  explicit InexactRig(const FitProblem& stated);
+
+  /// From a fit at the present numbers (at first the stated ones) to the best of both. The runs of `arrival` are this object's from then on.
+  void search(Arrival& arrival);
+
+  /// Rig, runs and numbers as they stand at the end of a search; errors of the numbers as stated.
+  Rig rig() const { return numbers_.rig_at(z_); }
+  std::vector<Run> runs() const;
+  std::vector<FittedGiven> numbers() const;
+
+  /// Covariance of the unknowns, numbers included, at the end of a search.
+  InexactUncertainty uncertainty(const Arrival& arrival) const { return inexact_uncertainty(arrival.joint, &*slopes_); }
+  /// The numbers as they came out, their covariance with the parameters as `result` has them, and warnings of those that are pulled far.
+  void describe(const JointProblem& joint, const InexactUncertainty& uncertainty, FitResult& result) const;
+
+ private:
+  struct Step {
+    Eigen::VectorXd unknowns, deviations;
+    double length = 0;    ///< in its own standard deviations
+  };
+  Step next_step(const Arrival& arrival) const;
+  struct Candidate {
+    Eigen::VectorXd z;
+    std::shared_ptr<const FitProblem> problem;  ///< whose runs the arrival looks at
+    Arrival arrival;
+    double cost() const { return arrival.joint.chi2() + z.squaredNorm(); }
+  };
+  Candidate moved(const Arrival& from, const Step& step, double part) const;
+
+  const FitProblem* stated_;
+  StatedNumbers numbers_;
+  Eigen::VectorXd z_;
+  std::shared_ptr<const FitProblem> problem_;  ///< at z_; none while they are the stated ones
+  std::optional<NumberSlopes> slopes_;
+};
+
+}  // namespace unrig

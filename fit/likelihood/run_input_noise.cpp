@@ -1,0 +1,121 @@
+#include <algorithm>
+#include <cmath>
+
+#include "fit/likelihood/input_noise.h"
+#include "fit/likelihood/readings_noise.h"
+#include "fit/likelihood/run_linearised.h"
+
+// RunResidual where noise of the measured inputs colours what is left of the readings: generalised least squares.
+
+namespace unrig {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+namespace {
+
+/// Where f is least between two ends, of a function that falls and then rises: golden section to a hundredth.
+template <class F>
+double least_between(double low, double high, F f) {
+  constexpr double golden = 0.6180339887498949, precision = 0.01;
+  double a = high - golden * (high - low), b = low + golden * (high - low), at_a = f(a), at_b = f(b);
+  const double at_low = f(low), first = low;
+  while (high - low > precision) {
+    if (at_a < at_b) {
+      high = b, b = a, at_b = at_a, a = high - golden * (high - low), at_a = f(a);
+    } else {
+      low = a, a = b, at_a = at_b, b = low + golden * (high - low), at_b = f(b);
+    }
+  }
+  return std::min(at_a, at_b) < at_low ? 0.5 * (low + high) : first;
+}
+
+}  // namespace
+
+void RunResidual::Linearised::keep_input_noise(RunResidual& run, const RunResidual& other) {
+  const InputNoise* noise = input_noise(other);
+  if (noise == input_noise(run)) return;
+  run.shared_ = std::make_shared<SharedResponses>();  // of its own: what else is shared belongs to another model
+  run.shared_->input_noise = other.shared_ ? other.shared_->input_noise : nullptr;
+}
+
+void RunResidual::Linearised::settle_input_noise(RunResidual& run, const VectorXd& theta, const MatrixXd& left) {
+  if (run.motion_.unknowns() > 0 || run.inputs_.cols() == 0) return;
+  const std::optional<InputNoiseModel> inputs = noise_of_inputs(*run.run_, run.conditions_);
+  if (!inputs) return;
+  LinearSystem linear = run.model_->system(run.conditions_, theta, run.channels_);
+  linear.feedback.clear();
+  for (DualMatrix* m : {&linear.A, &linear.B, &linear.C, &linear.D}) m->partial.clear();
+  const ExactStep to_next = exact_step(linear, run.run_->dt);
+  const MatrixXd column = MatrixXd((run.weight_.array() > 0).select(left, 0.0)).reshaped();
+  MatrixXd weight = run.tempered_ * run.weight_;
+  const auto improbable = [&](const MatrixXd& trial) {  // -2 log likelihood of what is left
+    const InputNoise noise(linear, to_next, *inputs, trial);
+    return noise.log_determinant() + noise.whitened(column).squaredNorm();
+  };
+  // Differences of a raw reading keep some of a fast signal; of an acceleration, what the force does to it at once, noise included.
+  const double most = std::log(100);
+  for (Index c = 0; c < weight.cols(); ++c) {
+    const auto sharper = [&](double logarithm) {
+      MatrixXd trial = weight;
+      trial.col(c) *= std::exp(logarithm);
+      return trial;
+    };
+    const double factor = std::exp(least_between(0, most, [&](double logarithm) { return improbable(sharper(logarithm)); }));
+    weight.col(c) *= factor;
+    run.weight_.col(c) *= factor;
+    run.sigma_[static_cast<std::size_t>(c)] /= factor;
+  }
+  run.shared_ = std::make_shared<SharedResponses>();  // copies of the run keep theirs
+  run.shared_->input_noise = std::make_shared<const InputNoise>(linear, to_next, *inputs, weight);
+}
+
+MatrixXd RunResidual::Linearised::white(const RunResidual& run, const MatrixXd& rows) { return input_noise(run)->whitened(rows) / run.tempered_; }
+
+MatrixXd RunResidual::Linearised::standardised(const RunResidual& run, const MatrixXd& left) {
+  const MatrixXd there = (run.weight_.array() > 0 && left.array().isFinite()).select(left, 0.0);
+  if (const InputNoise* noise = input_noise(run)) return MatrixXd(noise->whitened(there.reshaped())).reshaped(left.rows(), left.cols());
+  return run.tempered_ * run.weight_.cwiseProduct(there);
+}
+
+void RunResidual::Linearised::whiten(const RunResidual& run, Sensitivity& s) {
+  const Index columns = s.channels.front().slope.cols(), samples = run.last_sample_, channels = run.measured_.cols();
+  MatrixXd rows(samples * channels, columns + 1);
+  for (Index c = 0; c < channels; ++c) {
+    const Sensitivity::PerChannel& channel = s.channels[static_cast<std::size_t>(c)];
+    rows.middleRows(c * samples, samples) << channel.slope.topRows(samples), channel.residual.head(samples) + run.measured_.col(c).head(samples);
+  }
+  rows = white(run, rows);
+  for (Index c = 0; c < channels; ++c) {
+    Sensitivity::PerChannel& channel = s.channels[static_cast<std::size_t>(c)];
+    channel.slope.setZero();
+    channel.residual.setZero();
+    channel.slope.topRows(samples) = rows.middleRows(c * samples, samples).leftCols(columns);
+    channel.residual.head(samples) = rows.middleRows(c * samples, samples).col(columns);
+  }
+}
+
+void RunResidual::Linearised::settle_white(const RunResidual& run, const MatrixXd& start, std::vector<MatrixXd> tangents, const MatrixXd& right) {
+  const Index samples = right.rows(), unknowns = run.unknowns_;
+  MatrixXd rows = MatrixXd::Zero(samples * right.cols(), unknowns + 1);
+  blocks.clear();
+  for (Index c = 0; c < right.cols(); ++c) {
+    MatrixXd& tangent = tangents[static_cast<std::size_t>(c)];
+    auto own = rows.middleRows(c * samples, samples);
+    own.leftCols(unknowns) = tangent * start;
+    own.col(run.first_offset_ + c).setOnes();
+    own.col(unknowns) = right.col(c);
+    blocks.emplace_back(Interval{0, samples}, false, c, start, std::move(tangent), samples);
+  }
+  settle({white(run, rows)}, unknowns, 0);
+}
+
+MatrixXd standardised_readings(const RunResidual& run, const MatrixXd& left) { return RunResidual::Linearised::standardised(run, left); }
+
+double sigma_of_inputs(const RunResidual& run, std::size_t channel) {
+  const InputNoise* noise = RunResidual::Linearised::input_noise(run);
+  return noise ? std::sqrt(noise->variance(static_cast<Index>(channel))) : 0;
+}
+
+}  // namespace unrig

@@ -1,0 +1,223 @@
+#pragma once
+#include <Eigen/QR>
+#include <algorithm>
+#include <cmath>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <utility>
+#include <vector>
+
+#include "core/propagate/exact_step.h"
+#include "core/numerics/householder.h"
+#include "fit/likelihood/rest_rows.h"
+#include "fit/likelihood/run_residual.h"
+
+// What RunResidual's arithmetic shares between its linear and its nonlinear path. Not for others to include.
+
+namespace unrig {
+
+class InputNoise;
+
+namespace run_rows {
+
+/// The upper triangular (or trapezoidal) factor of `rows`: the same inner products in no more rows than columns.
+inline Eigen::MatrixXd compress(Eigen::MatrixXd rows) { return Householder(std::move(rows)).triangle(); }
+
+inline Eigen::MatrixXd stacked(const std::vector<Eigen::MatrixXd>& blocks, Eigen::Index columns) {
+  Eigen::Index total = 0;
+  for (const Eigen::MatrixXd& block : blocks) total += block.rows();
+  Eigen::MatrixXd stack(total, columns);
+  Eigen::Index row = 0;
+  for (const Eigen::MatrixXd& block : blocks) {
+    stack.middleRows(row, block.rows()) = block;
+    row += block.rows();
+  }
+  return stack;
+}
+
+/// Least squares by column-scaled QR. Columns that the rows do not determine (a state that no channel sees) are left at zero.
+class Eliminator {
+ public:
+  explicit Eliminator(const Eigen::MatrixXd& columns) : scale_(columns.colwise().norm().transpose().cwiseMax(1e-300).cwiseInverse()) {
+    constexpr double rank_tolerance = 1e-11;
+    const Eigen::MatrixXd scaled = columns * scale_.asDiagonal();
+    quick_ = Householder(scaled);
+    if (columns.rows() >= columns.cols() && (columns.cols() == 0 || quick_.factors().diagonal().cwiseAbs().minCoeff() > rank_tolerance)) return;
+    pivoted_.setThreshold(rank_tolerance);
+    pivoted_.compute(scaled);
+    deficient_ = true;
+  }
+  Eigen::Index rank() const { return deficient_ ? pivoted_.rank() : scale_.size(); }
+  /// Coordinates of `rows` in the columns' space (the first `rank` rows) and beside it.
+  Eigen::MatrixXd rotated(const Eigen::MatrixXd& rows) const {
+    return deficient_ ? Eigen::MatrixXd(pivoted_.householderQ().setLength(pivoted_.rank()).adjoint() * rows) : quick_.rotated(rows);
+  }
+  /// Solution of R x = rotated, back in the columns' own scale.
+  Eigen::MatrixXd solve(const Eigen::MatrixXd& rotated) const {
+    const Eigen::Index r = rank();
+    Eigen::MatrixXd x = Eigen::MatrixXd::Zero(scale_.size(), rotated.cols());
+    if (deficient_) {
+      x.topRows(r) = pivoted_.matrixQR().topLeftCorner(r, r).triangularView<Eigen::Upper>().solve(rotated.topRows(r));
+      x = pivoted_.colsPermutation() * x;
+    } else {
+      x = quick_.factors().topLeftCorner(r, r).triangularView<Eigen::Upper>().solve(rotated.topRows(r));
+    }
+    return scale_.asDiagonal() * x;
+  }
+  /// Column j of (R^T R)^-1: how the unknowns move with the score of unknown j. Zero for one that the rows do not determine.
+  Eigen::VectorXd covariance_column(Eigen::Index j) const {
+    const Eigen::Index r = rank();
+    Eigen::VectorXd score = scale_[j] * Eigen::VectorXd::Unit(scale_.size(), j);
+    if (deficient_) score = pivoted_.colsPermutation().transpose() * score;
+    const auto& factors = deficient_ ? pivoted_.matrixQR() : quick_.factors();
+    return solve(factors.topLeftCorner(r, r).triangularView<Eigen::Upper>().transpose().solve(score.head(r)));
+  }
+  /// R with R^T R = the columns' information matrix. Only where all columns are determined is it regular.
+  Eigen::MatrixXd factor() const {
+    const Eigen::Index n = scale_.size();
+    Eigen::MatrixXd r = Eigen::MatrixXd::Zero(n, n);
+    if (deficient_) {
+      const Eigen::Index k = rank();
+      Eigen::MatrixXd permuted = Eigen::MatrixXd::Zero(n, n);
+      permuted.topRows(k) = Eigen::MatrixXd(pivoted_.matrixQR().topRows(k).triangularView<Eigen::Upper>());
+      r = permuted * pivoted_.colsPermutation().transpose();
+      r = compress(r);
+    } else {
+      r = quick_.factors().topRows(n).triangularView<Eigen::Upper>();
+    }
+    return r * scale_.cwiseInverse().asDiagonal();
+  }
+
+ private:
+  Eigen::VectorXd scale_;
+  Householder quick_;
+  Eigen::ColPivHouseholderQR<Eigen::MatrixXd> pivoted_;
+  bool deficient_ = false;
+};
+
+/// Weighted rows of a block on their way through its rotations: those that c reaches, and what is left of the others.
+struct Rotated {
+  std::vector<Eigen::MatrixXd> kept, others;
+};
+
+/// One channel over one phase of the record. A phase at rest spans only the free response and the offset: its rows are rotated, stretch by stretch and then those kept of
+/// all stretches together, so that few of them hold all that c can reach, and the others only what is left. One in which the shaft moves is rotated where its
+/// own splines, the free response and the offset are clearly fewer than its samples.
+class Block {
+ public:
+  using Rotation = std::shared_ptr<const Householder>;
+
+  Interval samples;
+  bool moving = false;
+  Eigen::Index channel = 0;
+  Eigen::MatrixXd start;         ///< d state / d c at the phase's start; behind it, where the run goes on from another part, the state that it arrived in
+  Eigen::MatrixXd rows;          ///< nonlinear systems: d y / d c where the shaft moves, else d y / d state at the phase's start
+  Eigen::Index smooth_from = 0;  ///< at rest: the sample from which on whole stretches are polynomials; samples.last where none is
+
+  Block(const Interval& of, bool moves, Eigen::Index in_channel, Eigen::MatrixXd from, Eigen::MatrixXd tangents, Eigen::Index smooth)
+      : samples(of), moving(moves), channel(in_channel), start(std::move(from)), rows(std::move(tangents)), smooth_from(smooth) {}
+
+  bool is_smooth(const Interval& stretch) const { return !moving && stretch.first >= smooth_from && stretch.length() == rest_rows::stretch_samples; }
+
+  /// Sets up the rotation of the next stretch, from its weighted rows over [state at the phase's start | offset]; returns those kept.
+  Eigen::MatrixXd add_stretch(Eigen::MatrixXd span);
+  /// The same for a constant weight, from the rotation for a weight of one.
+  Eigen::MatrixXd add_stretch(double weight, const Rotation& rotation);
+  /// A stretch whose rows are few already.
+  void add_smooth_stretch() { rotations_.emplace_back(); }
+  /// Rotates the rows kept of all stretches together; returns what c does to them.
+  Eigen::MatrixXd join(const std::vector<Eigen::MatrixXd>& spans, Eigen::Index offset);
+  /// All of that from `rows`.
+  Eigen::MatrixXd rotate_rows(const Eigen::VectorXd& w, Eigen::Index offset);
+
+  /// Takes the rows of some of its samples, whole stretches of them.
+  void rotate(const Interval& some, Eigen::MatrixXd all, Rotated& rotated) const;
+  /// What c reaches of all rows taken; what is left joins the others.
+  Eigen::MatrixXd reached(Rotated& rotated) const;
+
+ private:
+  std::vector<Rotation> rotations_;  // per stretch, or of the whole motion; none where the rows are few already
+  Rotation joint_;                   // of what several stretches keep
+};
+
+/// Marquardt's (1963) step: s with least |R (s - full)|^2 + damping |D s|^2, D the lengths of R's columns.
+inline Eigen::VectorXd damped_step(const Eigen::MatrixXd& factor, const Eigen::VectorXd& full, double damping) {
+  const Eigen::Index n = factor.cols();
+  Eigen::MatrixXd rows(factor.rows() + n, n);
+  rows.topRows(factor.rows()) = factor;
+  rows.bottomRows(n) = (std::sqrt(damping) * factor.colwise().norm()).asDiagonal();
+  Eigen::VectorXd target = Eigen::VectorXd::Zero(rows.rows());
+  target.head(factor.rows()) = factor * full;
+  const Eliminator damped(rows);
+  return damped.solve(damped.rotated(target));
+}
+
+}  // namespace run_rows
+
+/// What follows from theta alone and is the same for all parts of a record: the free response without partials (of so many samples), and all responses with them. Kept for the theta that was asked for last.
+struct RunResidual::SharedResponses {
+  struct Rows {
+    Eigen::VectorXd theta;
+    Eigen::Index samples = 0;
+    LinearSystem system;
+    ExactStep step;
+    std::vector<rest_rows::FreeRows> free;
+    Eigen::MatrixXd leap;
+  };
+  struct Slopes {
+    Eigen::VectorXd theta;
+    std::vector<Eigen::Index> differentiated;
+    LinearSystem system;
+    ExactStep step;
+    FreeResponse free;
+    std::optional<rest_rows::SmoothResponse> smooth;  ///< where some part of a rest is looked at so
+  };
+  std::mutex in_use;
+  std::shared_ptr<const Rows> rows;
+  std::shared_ptr<const Slopes> slopes;
+  std::shared_ptr<const InputNoise> input_noise;  ///< how the noise of measured inputs colours the readings (fit/likelihood/input_noise.h); none: they count as exact
+};
+
+/// The model at one theta, without partials: its exact step, what the inputs alone do, where the unknown motion takes the states, and the rows
+/// of the linear unknowns.
+struct RunResidual::Linearised {
+  LinearSystem system;
+  ExactStep step;
+  Eigen::MatrixXd known;          // response to the measured inputs, samples x channels, empty without
+  Eigen::MatrixXd spline;         // states after a unit spline, n x samples of the longest motion
+  Eigen::MatrixXd spline_summed;  // and their running sum: states after splines at every sample
+  std::vector<rest_rows::FreeRows> free;  // free response per channel, for a stretch at rest or the longest motion
+  Eigen::MatrixXd leap;                   // transition over a stretch at rest
+  bool polynomials = false;               // whether what is left of a rest may be looked at as polynomials
+
+  std::vector<run_rows::Block> blocks;  // phase by phase, channel by channel
+  Eigen::MatrixXd end;                  // as their starts, behind the last sample
+
+  /// Solves the stacked rows [c | y] for c, beside a sum of squares that c cannot reach.
+  void settle(const std::vector<Eigen::MatrixXd>& rows, Eigen::Index unknowns, double unreachable) {
+    const Eigen::MatrixXd stack = run_rows::stacked(rows, unknowns + 1);
+    eliminate = std::make_unique<run_rows::Eliminator>(stack.leftCols(unknowns));
+    const Eigen::MatrixXd rotated = eliminate->rotated(stack.rightCols(1));
+    linear = eliminate->solve(rotated);
+    chi2 = unreachable + rotated.bottomRows(rotated.rows() - eliminate->rank()).squaredNorm();
+  }
+  std::unique_ptr<run_rows::Eliminator> eliminate;
+  Eigen::VectorXd linear;
+  double chi2 = 0;
+
+  // Where noise of the inputs colours all readings of a run (fit/likelihood/run_input_noise.cpp). Its weights are then a filter over the whole record, not a number for each reading.
+  static const InputNoise* input_noise(const RunResidual& run) { return run.shared_ ? run.shared_->input_noise.get() : nullptr; }
+  static void keep_input_noise(RunResidual& run, const RunResidual& other);
+  /// What `left` (samples x channels) makes most probable.
+  static void settle_input_noise(RunResidual& run, const Eigen::VectorXd& theta, const Eigen::MatrixXd& left);
+  /// Columns over the samples of all channels, one channel after the other, in units of the noise, white and tempered.
+  static Eigen::MatrixXd white(const RunResidual& run, const Eigen::MatrixXd& rows);
+  /// A sensitivity whose residual lacks the readings still.
+  static void whiten(const RunResidual& run, Sensitivity& sensitivity);
+  static Eigen::MatrixXd standardised(const RunResidual& run, const Eigen::MatrixXd& left);
+  /// Solves the rows [c | right] of the whole record for c. `tangents`: d y / d state at its start, per channel; `start`: d state / d c there.
+  void settle_white(const RunResidual& run, const Eigen::MatrixXd& start, std::vector<Eigen::MatrixXd> tangents, const Eigen::MatrixXd& right);
+};
+
+}  // namespace unrig

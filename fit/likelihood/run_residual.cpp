@@ -1,0 +1,336 @@
+#include "fit/likelihood/run_residual.h"
+
+#include <Eigen/QR>
+#include <algorithm>
+#include <cmath>
+
+#include <fmt/format.h>
+
+#include "core/run/bad_readings.h"
+#include "core/model/run_inputs.h"
+#include "core/run/run_limits.h"
+#include "fit/likelihood/run_linearised.h"
+
+namespace unrig {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+namespace {
+
+/// No reading is better than its converter, nor than the digits of a simulation, about a hundred-millionth of its range. A single wrong reading does not count in that.
+double least_noise(const VectorXd& value) {
+  constexpr double digits = 1e-8;
+  const double range = robust_range(value);
+  return range > 0 ? std::max(rounding_level(value), digits * range) : 0;
+}
+
+/// Standard deviation of a channel's noise; 0 where the channel never changes.
+double noise_of(const VectorXd& value) {
+  const double least = least_noise(value);
+  return least > 0 ? std::max(noise_level(value), least) : 0;
+}
+
+}  // namespace
+
+namespace {
+
+/// How far a motion reaches into a rest beside it: a shaft that sets out softly has left its level long before a few samples show that it moves. Means over `block`
+/// samples, in turn from the motion on, until two lie on the rest's level, within what the rest's own means scatter by, and not less than `white_scatter`. `mean(i)`: of block i.
+template <class Mean>
+Index soft_edge(Index blocks, Index block, double white_scatter, Mean mean) {
+  std::vector<double> all;
+  for (Index i = 0; i < blocks; ++i)
+    if (const double m = mean(i); std::isfinite(m)) all.push_back(m);
+  if (all.size() < 4) return 0;  // too short to have a level
+  std::nth_element(all.begin(), all.begin() + static_cast<std::ptrdiff_t>(all.size() / 2), all.end());
+  const double level = all[all.size() / 2];
+  for (double& m : all) m = std::abs(m - level);
+  std::nth_element(all.begin(), all.begin() + static_cast<std::ptrdiff_t>(all.size() / 2), all.end());
+  constexpr double deviations = 1.4826;  // of a normal distribution in its median absolute deviation
+  const double scatter = std::max(white_scatter, deviations * all[all.size() / 2]);  // coloured noise does not average out
+  constexpr double chance = 4;           // standard deviations of a block's mean
+  constexpr Index farthest = 25;  // blocks: a drift of the channel is no motion
+  Index reach = 0;
+  for (Index i = 0; i < std::min(blocks, farthest) && i < reach + 2; ++i)
+    if (std::abs(mean(i) - level) > chance * scatter) reach = i + 1;
+  constexpr Index unseen = 2;  // blocks: what sets out like t^3 is within the scatter for as long again
+  return reach > 0 ? std::min(blocks, reach + unseen) * block : 0;
+}
+
+/// Where the shaft moves, soft beginnings and ends included.
+std::vector<Interval> moving_softly(const VectorXd& angle, double sigma) {
+  std::vector<Interval> intervals = moving(angle, sigma);
+  constexpr Index block = 20;
+  const double scatter = sigma / std::sqrt(static_cast<double>(block));
+  const std::vector<Interval> hard = intervals;
+  for (std::size_t i = 0; i <= hard.size() && !hard.empty(); ++i) {  // the rest before interval i
+    const Index first = i == 0 ? 0 : hard[i - 1].last, last = i == hard.size() ? angle.size() : hard[i].first, blocks = (last - first) / block;
+    if (i < hard.size()) intervals[i].first -= soft_edge(blocks, block, scatter, [&](Index k) { return angle.segment(last - (k + 1) * block, block).mean(); });
+    if (i > 0) intervals[i - 1].last += soft_edge(blocks, block, scatter, [&](Index k) { return angle.segment(first + k * block, block).mean(); });
+  }
+  return intervals;
+}
+
+}  // namespace
+
+// Steps need a knot on every sample: 560 of them, four steps in a record, are corrected in 3 s. A motion that goes on and on has to do with fewer.
+Eigen::Index most_knots(std::size_t windows) { return windows > 1 ? 600 : 400; }
+
+namespace {
+
+/// A window that is shorter than the knots lie apart has none of its own: it becomes part of the one beside it. A single one is long enough.
+void join_short(std::vector<MotionBasis::Window>& windows, Index stride) {
+  for (std::size_t w = 0; windows.size() > 1 && w < windows.size();) {
+    if (windows[w].knots.length() >= stride) {
+      ++w;
+      continue;
+    }
+    Interval& beside = windows[w > 0 ? w - 1 : 1].knots;
+    beside = {std::min(beside.first, windows[w].knots.first), std::max(beside.last, windows[w].knots.last)};
+    windows.erase(windows.begin() + static_cast<std::ptrdiff_t>(w));
+  }
+}
+
+}  // namespace
+
+std::vector<MotionBasis::Window> motion_windows(const Run& run) {
+  const Channel* alpha = run.find("alpha");
+  if (!alpha || run.kind != RunKind::step) return {};
+  const double sigma = noise_level(alpha->value);
+  std::vector<MotionBasis::Window> windows;
+  for (const Interval& i : moving_softly(alpha->value, sigma)) {
+    // The load goes with the second derivative: it starts before the angle visibly does, and the drive rings after it has arrived, no longer for having moved for long.
+    const Index before = std::clamp<Index>(i.length() / 2, 8, 100), after = std::clamp<Index>(2 * i.length(), 60, 300);
+    const Index last_knot = run.samples() - 2;  // a shaft that still moves when the record ends is free up to there
+    MotionBasis::Window window{{std::max<Index>(0, i.first - before), std::min(last_knot, i.last + after)}, 1};
+    if (!windows.empty() && window.knots.first <= windows.back().knots.last + 4)
+      window.knots.first = windows.back().knots.first, windows.pop_back();
+    windows.push_back(window);
+  }
+  Index total = 0;
+  for (const auto& w : windows) total += w.knots.length();
+  const Index stride = 1 + total / (most_knots(windows.size()) + 1);
+  join_short(windows, stride);
+  for (auto& w : windows) w.stride = stride;
+  return windows;
+}
+
+RunResidual::RunResidual(const AeroelasticModel& model, const Run& run, std::vector<MotionBasis::Window> motion, RunOptions options)
+    : model_(&model),
+      run_(&run),
+      conditions_(options.conditions.value_or(conditions_of(run))),
+      channels_(model.output_channels(run)),
+      motion_(run.samples(), run.dt, motion) {
+  check_what_drives(run);
+  conditions_.prescribed_pitch = motion_.unknowns() > 0;
+  const Index n = run.samples();
+  last_sample_ = n;
+  const std::vector<Interval> active = motion_.active();
+  if (options.horizon > 0) last_sample_ = std::min(n, (active.empty() ? 0 : active.front().first) + options.horizon);
+
+  VectorXd use = VectorXd::Ones(n);
+  if (const Channel* weight = run.find("weight")) use = weight->value.unaryExpr([](double w) { return std::isfinite(w) ? std::sqrt(w) : 0.0; });
+  const auto judged = [counts = VectorXd(use)](const VectorXd& value) -> VectorXd { return (counts.array() > 0).select(value, std::nan("")); };  // for the noise
+  use.tail(n - last_sample_).setZero();
+
+  measured_.resize(n, static_cast<Index>(channels_.size()));
+  weight_.resizeLike(measured_);
+  for (std::size_t c = 0; c < channels_.size(); ++c) {
+    const VectorXd& value = run.channel(channels_[c]).value;
+    sigma_.push_back(noise_of(judged(value)));
+    if (!(sigma_[c] > 0))
+      throw InputError({run.file, run.header_line}, fmt::format("the column \"{}\" never changes", channels_[c]), "wanted a reading that answers to the rig",
+                       "Look for a broken cable or a stopped converter.");
+    for (Index k = 0; k < n; ++k) {
+      const bool there = std::isfinite(value[k]);
+      measured_(k, static_cast<Index>(c)) = there ? value[k] : 0;
+      weight_(k, static_cast<Index>(c)) = there ? use[k] / sigma_[c] : 0;
+    }
+  }
+  if (conditions_.prescribed_pitch) {
+    const VectorXd& value = run.channel("alpha").value;
+    angle_sigma_ = noise_of(judged(value));
+    const std::vector<bool> spike = isolated_spikes(value, angle_sigma_, active);
+    angle_ = value;
+    angle_weight_ = use / angle_sigma_;
+    for (Index k = 0; k < n; ++k) {
+      if (std::isfinite(value[k]) && !spike[static_cast<std::size_t>(k)]) continue;
+      spikes_ += std::isfinite(value[k]) ? 1 : 0;
+      angle_[k] = 0;
+      angle_weight_[k] = 0;
+    }
+  }
+  inputs_ = run_inputs(run, conditions_);
+  phases_ = motion_.phases();
+
+  // A step starts in the steady state of its first angle; everything else starts anyhow.
+  const LinearSystem system = model.system(conditions_, model.start_values(), channels_);
+  if (run.kind != RunKind::step) {
+    for (Index i = 0; i < system.free_states(); ++i) free_.push_back(i);
+    free_.insert(free_.end(), system.settling.begin(), system.settling.end());
+  }
+  free_.insert(free_.end(), system.exogenous.begin(), system.exogenous.end());
+  first_state_ = motion_.unknowns();
+  first_offset_ = first_state_ + static_cast<Index>(free_.size());
+  unknowns_ = first_offset_ + static_cast<Index>(channels_.size());
+  if (conditions_.prescribed_pitch) angle_offset_ = unknowns_++;
+  prepare_angle_rows();
+}
+
+Index RunResidual::observations() const {
+  return (weight_.array() > 0).count() + (angle_weight_.size() > 0 ? (angle_weight_.array() > 0).count() : 0);
+}
+
+Index RunResidual::degrees_of_freedom() const { return observations() - unknowns_; }
+
+/// Rows [c | angle] of the angle channel. Where the angle is constant all rows are alike and are one row with their common weight, besides a
+/// row for their scatter.
+void RunResidual::prepare_angle_rows() {
+  forget_solutions();
+  angle_rows_.clear();
+  if (motion_prior_.rows() > 0) angle_rows_.push_back(motion_prior_);
+  if (angle_offset_ < 0) return;
+  for (const MotionBasis::Phase& phase : phases_) {
+    const Interval& s = phase.samples;
+    const auto w = angle_weight_.segment(s.first, s.length());
+    const auto y = angle_.segment(s.first, s.length());
+    if (phase.moving) {
+      angle_rows_.push_back(angle_rows_in_motion(s));
+      continue;
+    }
+    const double total = w.squaredNorm();
+    if (total == 0) continue;
+    const double mean = w.cwiseAbs2().dot(y) / total, root = std::sqrt(total);
+    MatrixXd rows = MatrixXd::Zero(2, unknowns_ + 1);
+    rows.row(0).head(motion_.unknowns()) = root * motion_.angle_columns({s.first, s.first + 1});
+    rows(0, angle_offset_) = root;
+    rows(0, unknowns_) = root * mean;
+    rows(1, unknowns_) = std::sqrt((w.array() * (y.array() - mean)).square().sum());
+    angle_rows_.push_back(std::move(rows));
+  }
+  MatrixXd all = run_rows::stacked(angle_rows_, unknowns_ + 1);
+  if (all.rows() > 2 * all.cols()) angle_rows_ = {run_rows::compress(std::move(all))};
+}
+
+/// Motion unknowns whose splines begin in these samples: the first of them, and how many.
+std::pair<Index, Index> RunResidual::splines_in(const Interval& samples) const {
+  const auto begins_before = [](const MotionBasis::Column& column, Index sample) { return column.first < sample; };
+  const auto place = [&](Index sample) { return std::lower_bound(motion_.columns().begin(), motion_.columns().end(), sample, begins_before) - motion_.columns().begin(); };
+  return {place(samples.first), place(samples.last) - place(samples.first)};
+}
+
+/// Rows [c | angle] while the shaft moves: the splines that begin in these samples, beside the level that the earlier ones have led to.
+MatrixXd RunResidual::angle_rows_in_motion(const Interval& s) const {
+  const auto [first, count] = splines_in(s);
+  MatrixXd columns = motion_.angle_columns(s);
+  MatrixXd span(s.length(), count + 2);  // own splines, level, angle
+  span << columns.middleCols(first, count), VectorXd::Ones(s.length()), angle_.segment(s.first, s.length());
+  span = angle_weight_.segment(s.first, s.length()).asDiagonal() * span;
+  if (span.rows() > 2 * span.cols()) span = run_rows::compress(std::move(span));
+  MatrixXd rows = MatrixXd::Zero(span.rows(), unknowns_ + 1);
+  rows.leftCols(first) = span.col(count) * columns.row(0).head(first);
+  rows.middleCols(first, count) = span.leftCols(count);
+  rows.col(angle_offset_) = span.col(count);
+  rows.col(unknowns_) = span.col(count + 1);
+  return rows;
+}
+
+void RunResidual::weights_changed() {
+  smooth_readings_.clear();
+  prepare_angle_rows();
+}
+
+void RunResidual::arrive_in(DualMatrix state) {
+  if (arrival_.rows() == 0 || arrival_.value != state.value) forget_solutions();
+  last_evaluation_ = {};
+  arrival_ = std::move(state);
+}
+
+void RunResidual::share_responses_with(RunResidual& other) {
+  if (!other.shared_) other.shared_ = std::make_shared<SharedResponses>();
+  shared_ = other.shared_;
+}
+
+void RunResidual::set_motion_prior(const MatrixXd& rows) {
+  motion_prior_ = MatrixXd::Zero(rows.rows(), unknowns_ + 1);
+  if (rows.rows() > 0) motion_prior_.leftCols(unknowns_) = rows;
+  prepare_angle_rows();
+}
+
+void RunResidual::keep_noise_of(const RunResidual& other) {
+  sigma_ = other.sigma_;
+  weight_ = other.weight_;
+  Linearised::keep_input_noise(*this, other);
+  angle_sigma_ = other.angle_sigma_;
+  angle_ = other.angle_;
+  angle_weight_ = other.angle_weight_;
+  spikes_ = other.spikes_;
+  tempered_ = other.tempered_;
+  weights_changed();
+}
+
+RunResidual RunResidual::with_motion(std::vector<MotionBasis::Window> windows) const {
+  RunResidual other(*model_, *run_, std::move(windows));
+  other.keep_noise_of(*this);
+  if (last_linear_.size() == unknowns_ && unknowns_ > 0 && other.motion_.unknowns() > 0) {  // a search for c starts from the same motion
+    const Interval whole{0, run_->samples()};
+    VectorXd start(other.unknowns_);
+    start << other.motion_.angle_columns(whole).householderQr().solve(motion_.angle_columns(whole) * last_linear_.head(motion_.unknowns())), last_linear_.tail(unknowns_ - motion_.unknowns());
+    if (start.allFinite()) other.last_linear_ = start;
+  }
+  return other;
+}
+
+void RunResidual::settle_noise(const VectorXd& theta) {
+  const Prediction p = predict(theta);
+  // Knots as close as samples take up to half of the noise of both channels while the shaft moves.
+  std::vector<bool> at_rest(static_cast<std::size_t>(run_->samples()), false);
+  for (const MotionBasis::Phase& phase : phases_)
+    if (!phase.moving) std::fill(at_rest.begin() + phase.samples.first, at_rest.begin() + phase.samples.last, true);
+  const auto settle = [&](const std::string& channel, VectorXd residual, Eigen::Ref<VectorXd> weight, double& sigma) {
+    const auto counts = [&](Index k) { return weight[k] > 0 && std::isfinite(residual[k]); };
+    Index all = 0, resting = 0;
+    for (Index k = 0; k < residual.size(); ++k)
+      if (counts(k)) ++all, resting += at_rest[static_cast<std::size_t>(k)] ? 1 : 0;
+    constexpr Index enough = 100;  // samples, for a level to 9 %
+    const bool rests = resting >= enough;
+    if (!rests && all <= unknowns_) return;
+    for (Index k = 0; k < residual.size(); ++k)
+      if (!counts(k) || (rests && !at_rest[static_cast<std::size_t>(k)])) residual[k] = std::nan("");
+    // Of a shaft that hardly rests, all unknowns may have taken their share from this channel.
+    const double taken = rests ? 1 : std::sqrt(static_cast<double>(all) / static_cast<double>(all - unknowns_));
+    constexpr double chance = 0.06;  // two standard deviations between the two estimates for some thousand samples
+    const double third = noise_level(residual, 3), first = noise_level(residual, 1);
+    const double level = std::max(taken * (first < (1 + chance) * third ? first : third), least_noise(run_->channel(channel).value));
+    if (!(level > 0) || level >= sigma) return;
+    weight *= sigma / level;
+    sigma = level;
+  };
+  for (std::size_t c = 0; c < channels_.size(); ++c) {
+    const auto column = static_cast<Index>(c);
+    settle(channels_[c], measured_.col(column) - p.output.col(column), weight_.col(column), sigma_[c]);
+  }
+  if (angle_offset_ >= 0) settle("alpha", angle_ - p.motion.angle - VectorXd::Constant(angle_.size(), p.angle_offset[0]), angle_weight_, angle_sigma_);
+  if (p.output.allFinite()) Linearised::settle_input_noise(*this, theta, measured_ - p.output);
+  weights_changed();
+}
+
+Index RunResidual::reject_spikes(const VectorXd& theta, double limit) {
+  if (angle_offset_ < 0) return 0;
+  const Prediction p = predict(theta);
+  const auto off = [&](Index k) {
+    return k >= 0 && k < last_sample_ && angle_weight_[k] > 0 && std::abs(angle_[k] - p.angle_offset[0] - p.motion.angle[k]) > limit * angle_sigma_;
+  };
+  std::vector<Index> spikes;
+  for (Index k = 0; k < last_sample_; ++k)
+    if (off(k) && !(off(k - 1) && off(k + 1)) && !(off(k - 2) && off(k - 1)) && !(off(k + 1) && off(k + 2))) spikes.push_back(k);
+  for (Index k : spikes) angle_weight_[k] = 0;
+  const auto rejected = static_cast<Index>(spikes.size());
+  spikes_ += rejected;
+  if (rejected > 0) prepare_angle_rows();
+  return rejected;
+}
+
+}  // namespace unrig

@@ -1,0 +1,454 @@
+#include <algorithm>
+#include <cmath>
+#include <optional>
+
+#include "core/propagate/nonlinear_response.h"
+#include "fit/likelihood/run_linearised.h"
+
+// The arithmetic behind RunResidual: rows of the linear unknowns, their elimination, and what theta does beside them.
+
+namespace unrig {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::RowVectorXd;
+using Eigen::VectorXd;
+
+using run_rows::compress;
+using run_rows::stacked;
+
+VectorXd RunResidual::initial_state(const VectorXd& linear, Index states) const {
+  VectorXd state = VectorXd::Zero(states);
+  for (std::size_t i = 0; i < free_.size(); ++i) state[free_[i]] = linear[first_state_ + static_cast<Index>(i)];
+  if (arrival_.rows() > 0) state += arrival_.value.col(0);
+  return state;
+}
+
+Interval RunResidual::counted(const MotionBasis::Phase& phase) const { return {phase.samples.first, std::min(phase.samples.last, last_sample_)}; }
+
+Index RunResidual::longest_phase(bool moving) const {
+  Index longest = 0;
+  for (const MotionBasis::Phase& s : phases_)
+    if (s.moving == moving) longest = std::max(longest, counted(s).length());
+  return longest;
+}
+
+std::shared_ptr<RunResidual::Linearised> RunResidual::linearise(const VectorXd& theta) const {
+  auto lin = std::make_shared<Linearised>();
+  std::unique_lock<std::mutex> lock;
+  if (shared_) lock = std::unique_lock(shared_->in_use);
+  const bool known = shared_ && shared_->rows && shared_->rows->theta == theta && shared_->rows->samples == samples_of_free_response();
+  if (known) {
+    const SharedResponses::Rows& rows = *shared_->rows;
+    lin->system = rows.system, lin->step = rows.step, lin->free = rows.free, lin->leap = rows.leap;
+  } else {
+    lin->system = searched_system(theta);
+    for (DualMatrix* m : {&lin->system.A, &lin->system.B, &lin->system.C, &lin->system.D}) m->partial.clear();
+    lin->step = step_to_follow(lin->system, run_->dt);
+  }
+  if (!lin->system.feedback.empty()) return lin;
+  prepare_linear(*lin);
+  if (shared_ && !known) shared_->rows = std::make_shared<const SharedResponses::Rows>(SharedResponses::Rows{theta, samples_of_free_response(), lin->system, lin->step, lin->free, lin->leap});
+  return lin;
+}
+
+Index RunResidual::samples_of_free_response() const { return std::max(std::min(longest_phase(false), rest_rows::stretch_samples), longest_phase(true)); }
+
+/// Responses that the rows of a linear system are made of.
+void RunResidual::prepare_linear(Linearised& lin) const {
+  if (inputs_.cols() > 0)
+    lin.known = drive(lin.system, lin.step, DualMatrix(MatrixXd::Zero(lin.system.states(), 1)), run_->samples(), {}, inputs_, Partials::none).output;
+  if (lin.free.empty()) {
+    for (MatrixXd& rows : free_response_rows(lin.system, lin.step, samples_of_free_response())) lin.free.emplace_back(std::move(rows));
+    lin.leap = power(lin.step.transition.value, rest_rows::stretch_samples);
+  }
+  lin.polynomials = inputs_.cols() == 0;
+  if (motion_.unknowns() > 0) {
+    lin.spline = spline_states(lin.step, longest_phase(true) + 1);
+    lin.spline_summed = lin.spline;
+    for (Index k = 1; k < lin.spline.cols(); ++k) lin.spline_summed.col(k) += lin.spline_summed.col(k - 1);
+  }
+}
+
+/// d output / d motion unknowns over a phase in which the shaft moves, of the splines that begin in it: the response to one spline, shifted.
+MatrixXd RunResidual::motion_output_columns(const Linearised& lin, Index channel, const Interval& samples) const {
+  const RowVectorXd unit = lin.system.C.value.row(channel) * lin.spline, summed = lin.system.C.value.row(channel) * lin.spline_summed;
+  MatrixXd columns = MatrixXd::Zero(samples.length(), motion_.unknowns());
+  for (Index j = 0; j < motion_.unknowns(); ++j) {
+    const MotionBasis::Column& column = motion_.columns()[static_cast<std::size_t>(j)];
+    if (column.first < samples.first) continue;
+    const auto add = [&](const RowVectorXd& response, Index knot, double amount) {
+      const Index from = knot + 1;
+      if (amount == 0 || from >= samples.last) return;
+      columns.col(j).tail(samples.last - from) += amount * response.segment(1, samples.last - from).transpose();
+    };
+    for (Index i = 0; i < column.value.size(); ++i) add(unit, column.first + i, column.value[i]);
+    add(summed, column.first + column.value.size(), column.tail);
+  }
+  return columns;
+}
+
+/// d state / d motion unknowns behind such a phase, of the same splines.
+MatrixXd RunResidual::motion_state_columns(const Linearised& lin, const Interval& samples) const {
+  MatrixXd columns = MatrixXd::Zero(lin.spline.rows(), motion_.unknowns());
+  for (Index j = 0; j < motion_.unknowns(); ++j) {
+    const MotionBasis::Column& column = motion_.columns()[static_cast<std::size_t>(j)];
+    if (column.first < samples.first) continue;
+    for (Index i = 0; i < column.value.size(); ++i) {
+      const Index since = samples.last - column.first - i;
+      if (since <= 0) break;
+      columns.col(j) += column.value[i] * lin.spline.col(since);
+    }
+    const Index since_tail = samples.last - column.first - column.value.size();
+    if (column.tail != 0 && since_tail > 0) columns.col(j) += column.tail * lin.spline_summed.col(since_tail);
+  }
+  return columns;
+}
+
+/// d state / d c behind a phase, from that at its start.
+MatrixXd RunResidual::state_behind(const Linearised& lin, const MotionBasis::Phase& phase, const Interval& samples, const MatrixXd& start) const {
+  MatrixXd behind = power(lin.step.transition.value, samples.length()) * start;
+  if (phase.moving && motion_.unknowns() > 0) behind.leftCols(motion_.unknowns()) += motion_state_columns(lin, samples);
+  if (phase.moving && samples.last < run_->samples()) {
+    RowVectorXd angle = RowVectorXd::Zero(start.cols());
+    angle.head(motion_.unknowns()) = motion_.angle_columns({samples.last, samples.last + 1});
+    angle.tail(start.cols() - unknowns_).setConstant(arrival_angle(lin.system));
+    stand_still(behind, lin.system.motion, angle);
+  }
+  return behind;
+}
+
+/// The sample of a rest from which on nothing that c can do is more than a polynomial over whole stretches. Slopes in theta, t exp(-at) where c does
+/// exp(-at), get a stretch more.
+Index RunResidual::smooth_from(const Linearised& lin, const Interval& samples, const MatrixXd& start) const {
+  constexpr Index length = rest_rows::stretch_samples;
+  if (!lin.polynomials) return samples.last;
+  MatrixXd state = start;
+  for (Index first = samples.first; first + 2 * length <= samples.last; first += length, state = lin.leap * state)
+    if (std::all_of(lin.free.begin(), lin.free.end(), [&](const rest_rows::FreeRows& free) { return free.is_smooth(state, start); })) return first + length;
+  return samples.last;
+}
+
+/// The stretches of a block at rest: their rotations, and what c does to the rows that are kept.
+MatrixXd RunResidual::reach_at_rest(const Linearised& lin, run_rows::Block& block) const {
+  const rest_rows::FreeRows& free = lin.free[static_cast<std::size_t>(block.channel)];
+  const Index n = lin.system.states();
+  std::vector<MatrixXd> spans;
+  MatrixXd since = MatrixXd::Identity(n, n), smooth_since;  // transition up to the stretch; with the polynomials of the response behind it
+  for (Index first = block.samples.first; first < block.samples.last; first += rest_rows::stretch_samples) {
+    const Interval stretch{first, std::min(first + rest_rows::stretch_samples, block.samples.last)};
+    if (block.is_smooth(stretch)) {
+      smooth_since = smooth_since.size() > 0 ? MatrixXd(smooth_since * lin.leap) : MatrixXd(free.smooth * since);
+      const rest_rows::SmoothReadings& readings = smooth_readings(block.channel, stretch);
+      MatrixXd span(rest_rows::smooth_terms, n + 1);
+      span << readings.weight * smooth_since, readings.weight * rest_rows::smooth_constant();
+      spans.push_back(std::move(span));
+      block.add_smooth_stretch();
+      continue;
+    }
+    // The broken stretch at the end of the rest.
+    if (smooth_since.size() > 0) since = power(lin.step.transition.value, first - block.samples.first);
+    const auto w = weight_.col(block.channel).segment(first, stretch.length());
+    MatrixXd span(stretch.length(), n + 1);
+    if (free.rotation && stretch.length() == rest_rows::stretch_samples && w[0] > 0 && (w.array() == w[0]).all()) {
+      span = block.add_stretch(w[0], free.rotation);
+    } else {
+      span << w.asDiagonal() * free.rows.topRows(stretch.length()), w;
+      span = block.add_stretch(std::move(span));
+    }
+    span.leftCols(n) *= since;
+    spans.push_back(std::move(span));
+    since = since * lin.leap;
+  }
+  return block.join(spans, first_offset_ + block.channel);
+}
+
+/// What c does to the weighted readings of a block in which the shaft moves: by the splines that begin in it, by the state at its start, and by the offset.
+MatrixXd RunResidual::reach_in_motion(const Linearised& lin, run_rows::Block& block) const {
+  const Interval& s = block.samples;
+  const auto w = weight_.col(block.channel).segment(s.first, s.length());
+  const MatrixXd& free = lin.free[static_cast<std::size_t>(block.channel)].rows;
+  const bool from_rest = block.start.isZero(0);
+  const auto [first, count] = splines_in(s);
+  const Index n = from_rest ? 0 : lin.system.states();
+  MatrixXd span(s.length(), count + n + 1);
+  span << motion_output_columns(lin, block.channel, s).middleCols(first, count), free.topLeftCorner(s.length(), n), VectorXd::Ones(s.length());
+  span = w.asDiagonal() * span;
+  if (span.rows() > 2 * span.cols()) span = block.add_stretch(std::move(span));
+  MatrixXd reach = MatrixXd::Zero(span.rows(), block.start.cols());
+  reach.middleCols(first, count) = span.leftCols(count);
+  if (n > 0) reach += span.middleCols(count, n) * block.start;
+  reach.col(first_offset_ + block.channel) += span.rightCols(1);
+  return reach;
+}
+
+/// Weighted readings of a block on their way through its rotations, without what the inputs do.
+run_rows::Rotated RunResidual::rotated_readings(const Linearised& lin, const run_rows::Block& block, double& beside) const {
+  run_rows::Rotated rotated;
+  const Interval& s = block.samples;
+  const Index length = block.moving ? s.length() : rest_rows::stretch_samples;
+  for (Index first = s.first; first < s.last; first += length) {
+    const Interval stretch{first, std::min(first + length, s.last)};
+    if (block.is_smooth(stretch)) {
+      const rest_rows::SmoothReadings& readings = smooth_readings(block.channel, stretch);
+      block.rotate(stretch, readings.reading, rotated);
+      beside += readings.beside;
+      continue;
+    }
+    VectorXd y = measured_.col(block.channel).segment(first, stretch.length());
+    if (lin.known.size() > 0) y -= lin.known.col(block.channel).segment(first, stretch.length());
+    block.rotate(stretch, weight_.col(block.channel).segment(first, stretch.length()).cwiseProduct(y), rotated);
+  }
+  return rotated;
+}
+
+/// One stretch of readings at rest against polynomials; it does not depend on theta.
+const rest_rows::SmoothReadings& RunResidual::smooth_readings(Index channel, const Interval& stretch) const {
+  const std::pair<Index, Index> key{channel, stretch.first};
+  const auto known = smooth_readings_.find(key);
+  if (known != smooth_readings_.end()) return known->second;
+  return smooth_readings_
+      .emplace(key, rest_rows::smooth_readings(weight_.col(channel).segment(stretch.first, stretch.length()), measured_.col(channel).segment(stretch.first, stretch.length())))
+      .first->second;
+}
+
+/// All rows [c | y], those of phases at rest rotated and cut to what c can reach; solves for c. What the state that the run arrived in does lies in the span of the free response: it is taken
+/// from the readings behind the rotations.
+void RunResidual::stack_rows(Linearised& lin) const {
+  if (Linearised::input_noise(*this)) {
+    MatrixXd from = MatrixXd::Zero(lin.system.states(), unknowns_);
+    for (std::size_t i = 0; i < free_.size(); ++i) from(free_[i], first_state_ + static_cast<Index>(i)) = 1;
+    lin.settle_white(*this, from, free_response_rows(lin.system, lin.step, last_sample_), measured_.topRows(last_sample_) - lin.known.topRows(last_sample_));
+    lin.end = power(lin.step.transition.value, last_sample_) * from;
+    return;
+  }
+  std::vector<MatrixXd> rows;
+  double unreachable = 0;
+  MatrixXd start = MatrixXd::Zero(lin.system.states(), unknowns_ + arrival_.cols());
+  if (arrival_.cols() > 0) start.rightCols(1) = arrival_.value;
+  for (std::size_t i = 0; i < free_.size(); ++i) start(free_[i], first_state_ + static_cast<Index>(i)) = 1;
+  for (const MotionBasis::Phase& phase : phases_) {
+    const Interval s = counted(phase);
+    if (s.length() <= 0) break;
+    const Index smooth = phase.moving ? s.last : smooth_from(lin, s, start);
+    for (Index c = 0; c < measured_.cols(); ++c) {
+      run_rows::Block block{s, phase.moving, c, start, {}, smooth};
+      const MatrixXd reach = phase.moving ? reach_in_motion(lin, block) : reach_at_rest(lin, block);
+      run_rows::Rotated rotated = rotated_readings(lin, block, unreachable);
+      MatrixXd together(reach.rows(), unknowns_ + 1);
+      together << reach.leftCols(unknowns_), block.reached(rotated);
+      if (arrival_.cols() > 0) together.col(unknowns_) -= reach.col(unknowns_);
+      for (const MatrixXd& others : rotated.others) unreachable += others.squaredNorm();
+      rows.push_back(std::move(together));
+      lin.blocks.push_back(std::move(block));
+    }
+    start = state_behind(lin, phase, s, start);
+  }
+  lin.end = start;
+  rows.insert(rows.end(), angle_rows_.begin(), angle_rows_.end());
+  lin.settle(rows, unknowns_, unreachable);
+}
+
+RunResidual::Solution RunResidual::solve(const VectorXd& theta) const {
+  if (last_solution_.model && last_solution_.theta == theta) return last_solution_;
+  const std::shared_ptr<Linearised> lin = linearise(theta);
+  if (!lin->system.feedback.empty()) {
+    solve_nonlinear(*lin, theta);
+    return {theta, lin->chi2, lin->linear, lin};
+  }
+  stack_rows(*lin);
+  last_evaluation_ = {};
+  VectorXd departure = lin->end.leftCols(unknowns_) * lin->linear;
+  if (arrival_.cols() > 0) departure += lin->end.rightCols(1);
+  return last_solution_ = {theta, lin->chi2, lin->linear, lin, std::move(departure)};
+}
+
+/// The model's system, corners of its laws rounded where they have any.
+LinearSystem RunResidual::searched_system(const VectorXd& theta) const {
+  LinearSystem system = model_->system(conditions_, theta, channels_);
+  for (Feedback& f : system.feedback) {
+    if (f.rounded) f.law = f.rounded;
+    f.steps_per_sample = glance_ ? 1 : finer_ * f.steps_per_sample;
+  }
+  return system;
+}
+
+LinearSystem RunResidual::differentiable_system(const VectorXd& theta) const {
+  LinearSystem system = searched_system(theta);
+  if (differentiated_.empty()) return system;
+  for (DualMatrix* m : {&system.A, &system.B, &system.C, &system.D})
+    for (Index j = 0; j < m->parameters(); ++j)
+      if (std::find(differentiated_.begin(), differentiated_.end(), j) == differentiated_.end()) m->partial[static_cast<std::size_t>(j)].resize(0, 0);
+  return system;
+}
+
+namespace {
+
+/// What the parameters do to one channel over a phase at fixed c, beside its prediction: [d y / d theta | y].
+MatrixXd slopes_and_prediction(const Response& response, const Response& known, const Interval& s, Index channel, Index parameters) {
+  MatrixXd m = MatrixXd::Zero(response.output.rows(), parameters + 1);
+  m.col(parameters) = response.output.col(channel);
+  if (known.output.size() > 0) m.col(parameters) += known.output.col(channel).segment(s.first, s.length());
+  for (Index j = 0; j < parameters; ++j) {
+    const auto index = static_cast<std::size_t>(j);
+    if (index < response.partial.size() && response.partial[index].size() > 0) m.col(j) += response.partial[index].col(channel);
+    if (index < known.partial.size() && known.partial[index].size() > 0) m.col(j) += known.partial[index].col(channel).segment(s.first, s.length());
+  }
+  return m;
+}
+
+}  // namespace
+
+/// Follows the model with its partials through all phases at fixed c, and hands [d y / d theta | y] of each channel to `take`, piece by piece. Stretches that are
+/// smooth in `blocks` are handed on as coefficients of polynomials; none where there are no blocks. Returns the state behind the last sample, of a linear model.
+DualMatrix RunResidual::follow_partials(const VectorXd& theta, const VectorXd& linear, const std::vector<run_rows::Block>& blocks, const TakeRows& take) const {
+  std::shared_ptr<const SharedResponses::Slopes> at;
+  if (shared_) {
+    const std::lock_guard lock(shared_->in_use);
+    at = shared_->slopes;
+  }
+  if (!at || at->theta != theta || at->differentiated != differentiated_) {
+    LinearSystem system = differentiable_system(theta);
+    if (!system.feedback.empty()) {
+      follow_nonlinear_partials(system, theta, linear, take);
+      return {};
+    }
+    ExactStep step = exact_step(system, run_->dt);
+    FreeResponse free(system, step, Partials::all);
+    std::optional<rest_rows::SmoothResponse> smooth;
+    if (shared_ || std::any_of(blocks.begin(), blocks.end(), [](const run_rows::Block& block) { return !block.moving && block.smooth_from < block.samples.last; })) smooth.emplace(free);
+    at = std::make_shared<const SharedResponses::Slopes>(SharedResponses::Slopes{theta, differentiated_, std::move(system), std::move(step), std::move(free), std::move(smooth)});
+    if (shared_) {
+      const std::lock_guard lock(shared_->in_use);
+      shared_->slopes = at;
+    }
+  }
+  const auto& [its_theta, differentiated, system, step, free, smooth] = *at;
+  const auto parameters = static_cast<Index>(model_->parameters().size());
+  const Index channels = measured_.cols();
+  Response known;
+  if (inputs_.cols() > 0) known = drive(system, step, DualMatrix(MatrixXd::Zero(system.states(), 1)), run_->samples(), {}, inputs_, Partials::all);
+  DualMatrix state(MatrixXd::Zero(system.states(), 1), parameters);
+  state.value.col(0) = initial_state(linear, system.states());
+  if (arrival_.parameters() > 0) state.partial = arrival_.partial;
+  const Motion motion = motion_.unknowns() > 0 ? motion_of(motion_.coefficients(linear.head(motion_.unknowns())), run_->dt) : Motion{};
+  std::size_t block = 0;
+  for (const MotionBasis::Phase& phase : phases_) {
+    const Interval s = counted(phase);
+    if (s.length() <= 0) break;
+    const Index length = phase.moving ? s.length() : rest_rows::stretch_samples;
+    for (Index first = s.first; first < s.last; first += length) {
+      const Interval stretch{first, std::min(first + length, s.last)};
+      const bool is_smooth = !blocks.empty() && blocks[block].is_smooth(stretch);
+      const Response response = is_smooth        ? smooth->from(state)
+                                : phase.moving ? drive(system, step, state, stretch.length(), motion.jerk.segment(first, stretch.length()), {}, Partials::all)
+                                                 : free.from(state, stretch.length());
+      state = response.end;
+      if (phase.moving && stretch.last < run_->samples()) stand_still(state.value, system.motion, RowVectorXd::Constant(1, motion.angle[stretch.last] + arrival_angle(system)));
+      for (Index c = 0; c < channels; ++c) {
+        MatrixXd m = slopes_and_prediction(response, known, stretch, c, parameters);
+        m.col(parameters) += linear[first_offset_ + c] * (is_smooth ? rest_rows::smooth_constant() : VectorXd::Ones(stretch.length()));
+        take(block + static_cast<std::size_t>(c), stretch, std::move(m));
+      }
+    }
+    block += static_cast<std::size_t>(channels);
+  }
+  return state;
+}
+
+namespace {
+
+/// Of a model that runs away from every c that was tried.
+RunResidual::Evaluation says_nothing(Index parameters, Index unknowns) {
+  RunResidual::Evaluation e;
+  e.chi2 = INFINITY;
+  e.residual = VectorXd::Constant(parameters + 1, INFINITY);
+  e.jacobian = MatrixXd::Zero(parameters + 1, parameters);
+  e.linear = VectorXd::Zero(unknowns);
+  e.linear_slope = MatrixXd::Zero(unknowns, parameters);
+  e.linear_factor = MatrixXd::Zero(unknowns, unknowns);
+  return e;
+}
+
+}  // namespace
+
+RunResidual::Evaluation RunResidual::differentiate(const Solution& solution) const {
+  const bool is_last = solution.model == last_solution_.model;
+  if (is_last && last_evaluation_.residual.size() > 0) return last_evaluation_;
+  const Linearised& lin = *solution.model;
+  const auto parameters = static_cast<Index>(model_->parameters().size());
+  if (!std::isfinite(solution.chi2)) return says_nothing(parameters, unknowns_);
+  const bool coloured = Linearised::input_noise(*this) != nullptr;
+  std::vector<run_rows::Rotated> rotated_blocks(coloured ? 0 : lin.blocks.size());
+  double beside = 0;
+  MatrixXd whole = MatrixXd::Zero(coloured ? last_sample_ * measured_.cols() : 0, parameters + 1);
+  DualMatrix departure = follow_partials(solution.theta, solution.linear, coloured ? std::vector<run_rows::Block>{} : lin.blocks, [&](std::size_t b, const Interval& s, MatrixXd m) {
+    // Residual and its derivative, weighted: [-d y / d theta | measured - y].
+    m = -m;
+    if (coloured) {
+      const Index c = static_cast<Index>(b) % measured_.cols();
+      m.col(parameters) += measured_.col(c).segment(s.first, s.length());
+      whole.middleRows(c * last_sample_ + s.first, s.length()) = m;
+      return;
+    }
+    const run_rows::Block& block = lin.blocks[b];
+    if (block.is_smooth(s)) {
+      const rest_rows::SmoothReadings& readings = smooth_readings(block.channel, s);
+      m = readings.weight * m;
+      m.col(parameters) += readings.reading;
+      beside += readings.beside;
+    } else {
+      m.col(parameters) += measured_.col(block.channel).segment(s.first, s.length());
+      m = weight_.col(block.channel).segment(s.first, s.length()).asDiagonal() * m;
+    }
+    block.rotate(s, std::move(m), rotated_blocks[b]);
+  });
+  std::vector<MatrixXd> reached, others{std::sqrt(beside) * RowVectorXd::Unit(parameters + 1, parameters)};
+  if (coloured) reached.push_back(Linearised::white(*this, whole));
+  for (std::size_t b = 0; b < rotated_blocks.size(); ++b) {
+    reached.push_back(lin.blocks[b].reached(rotated_blocks[b]));
+    others.insert(others.end(), rotated_blocks[b].others.begin(), rotated_blocks[b].others.end());
+  }
+  for (const MatrixXd& rows : angle_rows_) {
+    MatrixXd m = MatrixXd::Zero(rows.rows(), parameters + 1);
+    m.col(parameters) = rows.col(unknowns_) - rows.leftCols(unknowns_) * solution.linear;
+    reached.push_back(std::move(m));
+  }
+  const MatrixXd rotated = lin.eliminate->rotated(stacked(reached, parameters + 1));
+  const Index rank = lin.eliminate->rank();
+  others.push_back(rotated.bottomRows(rotated.rows() - rank));
+  const MatrixXd triangle = compress(stacked(others, parameters + 1));
+
+  Evaluation e;
+  e.linear = solution.linear;
+  e.linear_factor = lin.eliminate->factor();
+  e.linear_slope = lin.eliminate->solve(rotated.leftCols(parameters));
+  e.residual = VectorXd::Zero(parameters + 1);
+  e.jacobian = MatrixXd::Zero(parameters + 1, parameters);
+  e.jacobian.topRows(triangle.rows()) = triangle.leftCols(parameters);
+  e.residual.head(triangle.rows()) = triangle.col(parameters);
+  e.chi2 = e.residual.squaredNorm();
+  if (departure.rows() > 0) {
+    const MatrixXd followed = lin.end.leftCols(unknowns_) * e.linear_slope;
+    for (Index j = 0; j < parameters; ++j)
+      if (!followed.col(j).isZero(0)) departure.add_partial(j, followed.col(j));
+    e.departure = std::move(departure);
+  }
+  if (!solution.model->system.feedback.empty()) guide_ = {solution.theta, e.linear, e.linear_slope, solution.chi2};
+  if (is_last) last_evaluation_ = e;
+  return e;
+}
+
+RunResidual::Evaluation RunResidual::evaluate(const VectorXd& theta, Partials partials) const {
+  const Solution solution = solve(theta);
+  if (partials == Partials::all) return differentiate(solution);
+  const auto parameters = static_cast<Index>(model_->parameters().size());
+  Evaluation e;
+  e.chi2 = solution.chi2;
+  e.residual = VectorXd::Zero(parameters + 1);
+  e.residual[parameters] = std::sqrt(e.chi2);
+  e.linear = solution.linear;
+  return e;
+}
+
+}  // namespace unrig

@@ -1,0 +1,32 @@
+#pragma once
+#include <string>
+
+#include "fit/likelihood/joint_problem.h"
+
+namespace unrig {
+
+/// Whether any of the runs is a free decay or is driven by what is measured: its motion is not estimated.
+bool has_decays(const JointProblem& joint);
+
+/// Whether following the model takes several steps a sample in any of the runs (freeplay).
+bool takes_small_steps(const JointProblem& joint);
+
+/// What a fit leaves of the decays.
+struct DecaysLeft {
+  double chi2 = 0;       ///< over the degrees of freedom, at the noise levels themselves
+  bool exactly = false;  ///< by the model itself; else chi2 is J over the samples of laws trusted to within 2.5 % of the force that is missed, infinite if not worth it
+};
+
+/// Fits the runs of `joint` whose motion is not estimated, with the nonlinear effect `id` at work, and leaves what it finds in `joint`. With a strong nonlinearity
+/// chi-square has minima everywhere, because a small error of theta grows along the record. So theta and the trajectories are first searched side by side with
+/// laws that are trusted more and more (fit/search/law_smoother.h), from the present size of the effect (its first parameter) and from the first values of parameters that
+/// have gone astray; from there theta and the linear unknowns c are searched side by side with the model itself. Where that does not follow the decays, once more from
+/// a smaller and a larger size. A large trajectory that crosses the corners of a law for seconds tells errors of theta from each other as little as chance does, and has least chi-squares
+/// everywhere: of the ways to a law that takes small steps the one that leaves least is kept, and where it leaves one of the decays above its noise, the law is asked what it leaves
+/// when it is trusted to within some per cent; that holds where it is the noise, or where the model itself leaves more than half as much again.
+DecaysLeft fit_decays(JointProblem& joint, const std::string& id);
+
+/// What laws that are trusted to within 2.5 % of the force that is missed leave of the decays: J over the samples, at the joint problem's theta.
+double left_as_trusted(const JointProblem& joint);
+
+}  // namespace unrig

@@ -1,0 +1,365 @@
+#include "fit/search/effect_search.h"
+
+#include <Eigen/QR>
+#include <algorithm>
+#include <cmath>
+
+#include "core/effects/effect.h"
+#include "core/numerics/in_parallel.h"
+#include "core/numerics/spectrum.h"
+#include "fit/search/decays_first.h"
+#include "fit/fit.h"
+#include "fit/search/own_parameters.h"
+#include "fit/likelihood/standardised_residual.h"
+
+namespace unrig {
+namespace {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+/// Share of a residual's samples that its colour leaves independent: the flatness of its spectrum, 1 for white noise.
+double independent_share(const VectorXd& left) {
+  const VectorXd power = fourier(left).cwiseAbs2();
+  const double mean = power.mean();
+  return mean > 0 ? std::min(1.0, 2 * mean * mean / power.cwiseAbs2().mean()) : 1;  // the lines of white noise are exponentially distributed
+}
+
+constexpr double run_away = 1e30;  // variance of a run whose model does not stay finite: infinite, but two of them can be compared
+
+/// What the present fit leaves of a run.
+struct LeftOfRun {
+  double variance = 0;     // residual power over noise power
+  double samples = 0;
+  double independent = 0;  // of them, as the residual's colour says
+  double angle_variance = 1, angle_samples = 0;
+};
+
+/// A law that is missing bends the motion too, within the noise of the angle.
+void look_at_angle(const RunResidual& run, const RunResidual::Prediction& p, LeftOfRun& left) {
+  if (run.motion().unknowns() == 0) return;
+  const VectorXd& angle = run.run().channel("alpha").value;
+  double power = 0;
+  for (Index k = 0; k < angle.size(); ++k) {
+    if (!(run.angle_weight()[k] > 0) || !std::isfinite(angle[k])) continue;
+    power += std::pow(run.angle_weight()[k] * (angle[k] - p.motion.angle[k] - p.angle_offset[0]), 2);
+    ++left.angle_samples;
+  }
+  left.angle_variance = power / left.angle_samples;
+}
+
+std::vector<LeftOfRun> left_of_runs(const JointProblem& joint) {
+  std::vector<LeftOfRun> all(joint.runs().size());
+  in_parallel(all.size(), [&](std::size_t r) {
+    const RunResidual& run = joint.runs()[r];
+    const auto every_sample = static_cast<double>(run.run().samples());
+    if (run.is_aside()) {
+      all[r] = {1, every_sample, every_sample};
+      return;
+    }
+    const RunResidual::Prediction p = run.predict(joint.theta(r));
+    if (!p.output.allFinite()) {
+      all[r] = {run_away, every_sample, every_sample};
+      return;
+    }
+    double power = 0;
+    for (std::size_t c = 0; c < p.channels.size(); ++c) {
+      const VectorXd left = standardised_residual(run, p, c);
+      const auto samples = static_cast<double>((left.array() != 0).count());
+      power += left.squaredNorm();
+      all[r].samples += samples;
+      all[r].independent += independent_share(left) * samples;
+    }
+    all[r].variance = power / all[r].samples;
+    look_at_angle(run, p, all[r]);
+  });
+  return all;
+}
+
+/// How far chi-square would fall by one Gauss-Newton step in all unknowns.
+double promised_share(const JointProblem& joint, double before) {
+  const JointProblem::Linearisation lin = joint.linearise();
+  std::vector<Index> free;
+  for (std::size_t i = 0; i < joint.unknowns().size(); ++i)
+    if (!joint.unknowns()[i].held && lin.jacobian.col(static_cast<Index>(i)).norm() > 0) free.push_back(static_cast<Index>(i));
+  if (free.empty() || !lin.residual.allFinite()) return -INFINITY;  // the model runs away from where it would start
+  MatrixXd j = lin.jacobian(Eigen::all, free);
+  for (Index k = 0; k < j.cols(); ++k) j.col(k).normalize();
+  const Eigen::ColPivHouseholderQR<MatrixXd> qr(j);
+  const VectorXd left = lin.residual - j * qr.solve(lin.residual);
+  return 1 - left.squaredNorm() / before;
+}
+
+/// Weights of the runs such that each is left with about the power of its noise; true where that changed any by more than a tenth.
+bool temper(JointProblem& joint) {
+  bool changed = false;
+  const std::vector<LeftOfRun> left = left_of_runs(joint);
+  for (std::size_t r = 0; r < left.size(); ++r) {
+    if (joint.runs()[r].is_aside() || !(left[r].variance < run_away)) continue;
+    const double factor = std::sqrt(std::max(1.0, left[r].variance)), now = factor < 1.1 ? 1.0 : factor;
+    changed = changed || std::abs(std::log(now / joint.runs()[r].tempered())) > 0.1;
+    joint.runs()[r].temper(now);
+  }
+  return changed;
+}
+
+/// At the corners of a law slopes promise what steps do not keep: a search ends where they promise less than so much of chi-square.
+double precision_at_corners(const JointProblem& joint) {
+  constexpr double some = 0.02;
+  double freedom = 0;
+  for (const RunResidual& run : joint.runs()) freedom += run.is_aside() ? 0 : static_cast<double>(run.degrees_of_freedom());
+  return std::sqrt(some * freedom);
+}
+
+void anneal(Arrival& arrival, int rounds) {
+  const bool has_corners = takes_small_steps(arrival.joint);
+  for (int round = 0; round < rounds; ++round) {
+    JointProblem::SolveOptions options;
+    options.iterations = has_corners ? 3 : 8;
+    options.tolerance = 1e-3;
+    options.precision = has_corners ? precision_at_corners(arrival.joint) : 0.5;  // candidates differ by more than half a standard error, or cannot be told apart
+    options.most_evaluations = 12;
+    solve(arrival, options);
+    if (!temper(arrival.joint)) return;
+  }
+}
+
+void measure(Trial& trial) {
+  JointProblem& joint = trial.arrival.joint;
+  trial.variance.clear();
+  trial.samples.clear();
+  trial.angle_variance.clear();
+  trial.angle_samples.clear();
+  trial.variables = 0;
+  const std::vector<LeftOfRun> left = left_of_runs(joint);
+  for (std::size_t r = 0; r < left.size(); ++r) {
+    const bool as_trusted = !trial.decays.exactly && std::isfinite(trial.decays.chi2) && joint.runs()[r].motion().unknowns() == 0;
+    trial.variance.push_back(as_trusted ? std::max(1.0, trial.decays.chi2) : left[r].variance);
+    trial.samples.push_back(left[r].independent);
+    trial.angle_variance.push_back(left[r].angle_variance);
+    trial.angle_samples.push_back(left[r].angle_samples);
+    trial.variables += static_cast<int>(joint.runs()[r].linear_unknowns());
+  }
+  for (const Unknown& u : joint.unknowns()) trial.variables += u.held ? 0 : 1;
+}
+
+/// Whether an effect is a nonlinear law in any of the runs.
+bool is_a_law(const std::string& id, const AeroelasticModel& rig, const JointProblem& joint) {
+  const AeroelasticModel model = rig.with_effects({id});
+  return std::any_of(joint.runs().begin(), joint.runs().end(), [&](const RunResidual& run) { return !model.system(run.conditions(), model.start_values(), run.channels()).feedback.empty(); });
+}
+
+/// The effects of a problem: those that are linear in every run, then each of the others by itself.
+std::vector<std::vector<std::string>> in_order(const FitProblem& problem, const JointProblem& joint) {
+  std::vector<std::vector<std::string>> order(1);
+  const AeroelasticModel rig = model_of(problem.rig, problem.runs, problem.circulation);
+  for (const std::string& id : problem.effects) {
+    if (is_a_law(id, rig, joint)) order.push_back({id});
+    else order.front().push_back(id);
+  }
+  if (order.front().empty()) order.erase(order.begin());
+  return order;
+}
+
+}  // namespace
+
+bool any_aside(const JointProblem& joint) {
+  return std::any_of(joint.runs().begin(), joint.runs().end(), [](const RunResidual& run) { return run.is_aside(); });
+}
+
+bool nonlinear(const Trial& trial) {
+  const JointProblem& joint = trial.arrival.joint;
+  for (std::size_t r = 0; r < joint.runs().size(); ++r)
+    if (joint.runs()[r].largest_arguments(joint.theta(r)).size() > 0) return true;
+  return false;
+}
+
+bool brings_a_law(const Trial& trial) {
+  const AeroelasticModel& model = trial.arrival.joint.model();
+  return is_a_law(trial.effects.back(), AeroelasticModel(model.rig(), model.basis(), model.circulation()), trial.arrival.joint);
+}
+
+bool is_a_signal(const std::string& id, const JointProblem& joint) {
+  const AeroelasticModel& all = joint.model();
+  const AeroelasticModel model = AeroelasticModel(all.rig(), all.basis(), all.circulation()).with_effects({id});
+  return std::any_of(joint.runs().begin(), joint.runs().end(), [&](const RunResidual& run) { return !model.system(run.conditions(), model.start_values(), run.channels()).exogenous.empty(); });
+}
+
+double Trial::reduced_chi2() const {
+  double power = 0, count = 0;
+  for (std::size_t r = 0; r < variance.size(); ++r) {
+    const auto n = static_cast<double>(arrival.joint.runs()[r].run().samples());
+    power += n * variance[r];
+    count += n;
+  }
+  return power / count;
+}
+
+double Trial::excess() const {
+  double power = 0, count = 0;
+  for (std::size_t r = 0; r < variance.size(); ++r) {
+    const auto n = static_cast<double>(arrival.joint.runs()[r].run().samples());
+    power += n * std::max(0.0, variance[r] - 1);
+    count += n;
+  }
+  return power / count;
+}
+
+namespace {
+
+const Trial& better_of(const Trial& a, const Trial& b) { return a.reduced_chi2() < b.reduced_chi2() ? a : b; }
+
+}  // namespace
+
+double deviance_difference(const Trial& a, const Trial& b) {
+  const Trial& better = better_of(a, b);
+  double difference = 0;
+  for (std::size_t r = 0; r < a.variance.size(); ++r) {
+    difference += better.samples[r] * std::log(a.variance[r] / b.variance[r]);
+    // Of a run that is not explained the gauge is weighted down, and does not bend the motion.
+    if (a.angle_samples[r] > 0 && std::max(a.variance[r], b.variance[r]) < explained) difference += b.angle_samples[r] * std::log(a.angle_variance[r] / b.angle_variance[r]);
+  }
+  return difference;
+}
+
+double bic_difference(const Trial& a, const Trial& b) {
+  double total = 0;
+  for (const double samples : better_of(a, b).samples) total += samples;
+  return deviance_difference(a, b) + (a.variables - b.variables) * std::log(total);
+}
+
+Trial fit_baseline(const FitProblem& problem) {
+  const auto model = std::make_shared<const AeroelasticModel>(model_of(problem.rig, problem.runs, problem.circulation));
+  const ArrivalEffort effort{false, 10, 0.5, 15};
+  Trial trial{{}, arrive(problem, model, effort)};
+  temper(trial.arrival.joint);
+  anneal(trial.arrival, 5);
+  measure(trial);
+  return trial;
+}
+
+Trial prepare(const FitProblem& problem, const Trial& base, const std::vector<std::string>& effects) {
+  std::vector<std::string> added;
+  for (const std::string& id : effects)
+    if (std::find(base.effects.begin(), base.effects.end(), id) == base.effects.end()) added.push_back(id);
+  const auto model = std::make_shared<const AeroelasticModel>(model_of(problem.rig, problem.runs, problem.circulation, effects));
+  Trial trial{effects, extend(problem, base.arrival, model, added)};
+  if (any_aside(trial.arrival.joint)) trial.decays = base.decays;
+  for (RunResidual& run : trial.arrival.joint.runs()) run.glance(true);
+  trial.score = promised_share(trial.arrival.joint, base.arrival.joint.chi2());
+  for (RunResidual& run : trial.arrival.joint.runs()) run.glance(false);
+  return trial;
+}
+
+void fit_fully(Trial& trial, int rounds) {
+  anneal(trial.arrival, rounds);
+  measure(trial);
+}
+
+void follow_finer(Trial& trial, Index times) {
+  for (RunResidual& run : trial.arrival.joint.runs()) run.follow_in(times);
+  fit_fully(trial, 2);
+}
+
+double left_of_decays(const Trial& trial) {
+  double power = 0, count = 0;
+  for (std::size_t r = 0; r < trial.variance.size(); ++r) {
+    const RunResidual& run = trial.arrival.joint.runs()[r];
+    if (run.motion().unknowns() > 0) continue;
+    power += static_cast<double>(run.run().samples()) * trial.variance[r];
+    count += static_cast<double>(run.run().samples());
+  }
+  return power / count;
+}
+
+bool decays_decide(const Trial& trial) { return takes_small_steps(trial.arrival.joint) && has_decays(trial.arrival.joint); }
+
+bool fit_decays_first(Trial& trial, const Trial& base) {
+  JointProblem& joint = trial.arrival.joint;
+  constexpr double worth_it = 0.5;
+  const double before = left_of_decays(base), followed = takes_small_steps(joint) ? 1.15 : 2;  // corners are seen where a fit with everything free loses its way
+  if (!has_decays(joint) || before < followed) {
+    measure(trial);
+    return !has_decays(joint) || !takes_small_steps(joint);  // a gap would show
+  }
+  trial.decays = fit_decays(joint, trial.effects.back());
+  const bool helps = trial.decays.chi2 - 1 < worth_it * (before - 1);
+  measure(trial);
+  if (helps)
+    in_parallel(joint.runs().size(), [&](std::size_t r) {  // c of the others still is the baseline's
+      constexpr double astray = 10;
+      RunResidual& run = joint.runs()[r];
+      if (run.takes_small_steps(joint.theta(r)) || trial.variance[r] > astray) run.find_linear(joint.theta(r));
+    });
+  temper(joint);
+  measure(trial);
+  return helps;
+}
+
+namespace {
+
+/// The runs whose motion is estimated, once the decays have told theta under a law with corners: each by itself, then all of them. Decays that are not followed exactly are set aside.
+void follow_motions(Trial& trial) {
+  JointProblem& joint = trial.arrival.joint;
+  const auto moves = [](const RunResidual& run) { return run.motion().unknowns() > 0; };
+  if (std::none_of(joint.runs().begin(), joint.runs().end(), moves)) return;
+  for (RunResidual& run : joint.runs()) run.set_aside(!trial.decays.exactly && !moves(run));
+  fit_own_parameters(joint);
+  temper(joint);
+  measure(trial);
+  Trial together = trial;
+  fit_fully(together, 2);
+  if (together.excess() < trial.excess()) trial = std::move(together);
+}
+
+}  // namespace
+
+void judge_decays(Trial& trial) {
+  if (!any_aside(trial.arrival.joint)) return;
+  trial.decays = {left_as_trusted(trial.arrival.joint), false};
+  measure(trial);
+}
+
+bool follow_nonlinear(Trial& trial, const Trial& base, double least) {
+  trial.ruled_out = !fit_decays_first(trial, base);
+  if (trial.ruled_out) return false;
+  if (decays_decide(trial)) {
+    follow_motions(trial);
+    return true;
+  }
+  fit_fully(trial, 2);
+  if (trial.reduced_chi2() < least) fit_fully(trial, 6);
+  return true;
+}
+
+Arrival arrive_at_effects(const FitProblem& problem) {
+  Trial best = fit_baseline(problem);
+  for (const std::vector<std::string>& added : in_order(problem, best.arrival.joint)) {
+    std::vector<std::string> at_work = best.effects;
+    at_work.insert(at_work.end(), added.begin(), added.end());
+    Trial trial = prepare(problem, best, at_work);
+    if (nonlinear(trial)) follow_nonlinear(trial, best, best.reduced_chi2());
+    else fit_fully(trial, 2);
+    best = std::move(trial);
+  }
+  if (leaves_nothing(best) || decays_decide(best)) return best.arrival;
+  if (nonlinear(best)) {
+    fit_from_first_guesses(problem, best);
+    return best.arrival;
+  }
+  Trial anew{best.effects, arrive_with_effects(problem, best.arrival)};
+  measure(anew);
+  return bic_difference(anew, best) < 0 ? anew.arrival : best.arrival;
+}
+
+void fit_from_first_guesses(const FitProblem& problem, Trial& trial) {
+  const ArrivalEffort effort{false, 10, 0.5, 15};
+  Trial other{trial.effects, arrive_with_effects(problem, trial.arrival, effort), trial.score};
+  temper(other.arrival.joint);
+  anneal(other.arrival, 5);
+  measure(other);
+  if (trial.variance.empty() || bic_difference(other, trial) < 0) trial = std::move(other);
+}
+
+}  // namespace unrig

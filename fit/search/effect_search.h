@@ -1,0 +1,84 @@
+#pragma once
+#include <cmath>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "fit/search/arrival.h"
+#include "fit/search/decays_first.h"
+
+namespace unrig {
+
+/// A set of effects, fitted.
+struct Trial {
+  std::vector<std::string> effects;
+  Arrival arrival;
+  double score = 0;               ///< share of chi-square that one linear step promised to remove, at the noise levels of the time
+  std::vector<double> variance = {};   ///< per run: residual power over noise power
+  std::vector<double> samples = {};    ///< per run: as many of them as the residual's colour leaves independent
+  std::vector<double> angle_variance = {}, angle_samples = {};  ///< the same of the angle, where the motion is estimated; no samples elsewhere
+  int variables = 0;
+  DecaysLeft decays = {INFINITY, true};  ///< what fit_decays left of them; infinite: not asked
+  bool ruled_out = false;         ///< by the free decays: the other runs were not searched
+
+  double reduced_chi2() const;    ///< over all runs, in units of the noise
+  /// Residual power above the noise, over the noise; a run that is left with less than its noise makes up for no other.
+  double excess() const;
+};
+
+constexpr double explained = 1.15;  ///< residual power over noise power of a model that leaves nothing to name
+inline bool leaves_nothing(const Trial& trial) { return trial.reduced_chi2() < explained; }
+
+/// Whether any of the runs counts for nothing (RunResidual::set_aside).
+bool any_aside(const JointProblem& joint);
+
+/// Whether nonlinear effects are at work in any of the runs.
+bool nonlinear(const Trial& trial);
+/// Whether the last effect is such a law.
+bool brings_a_law(const Trial& trial);
+
+/// Whether an effect is a signal with amplitudes of its own in each run, which take a share of anything that lies at its frequencies.
+bool is_a_signal(const std::string& id, const JointProblem& joint);
+
+/// -2 ln likelihood of the gauge with each run's own variance, and of the angle where both explain the run, plus ln(samples) per variable, of `a` less that of `b`
+/// (G. Schwarz, Annals of Statistics 6 (1978) 461). Samples of the gauge count by the colour of the better of the two.
+double bic_difference(const Trial& a, const Trial& b);
+/// The same without what variables cost: -2 ln likelihood.
+double deviance_difference(const Trial& a, const Trial& b);
+
+/// The best fit with nothing missing.
+Trial fit_baseline(const FitProblem& problem);
+
+/// One linear step from `base` with `effects` (those of base and one more): what would it remove?
+Trial prepare(const FitProblem& problem, const Trial& base, const std::vector<std::string>& effects);
+
+/// Residual power over noise power of the runs whose motion is not estimated.
+double left_of_decays(const Trial& trial);
+
+/// Whether following the model takes several steps a sample (freeplay): then free decays tell whether the law is worth following the other runs.
+bool decays_decide(const Trial& trial);
+
+/// Of decays that are set aside: what is left of them where their laws are trusted to within some per cent, all unknowns held (fit/search/decays_first.h).
+void judge_decays(Trial& trial);
+
+/// Of a prepared trial whose last effect is nonlinear: theta from the free decays alone (fit/search/decays_first.h), where there are any that
+/// `base` does not follow. False where the effect leaves more than half of the excess that `base` leaves of them: the other runs are not worth the search.
+bool fit_decays_first(Trial& trial, const Trial& base);
+
+/// Fits a prepared trial whose last effect is nonlinear: by the free decays first, then everything, in full where that leaves less than `least`. False where the free decays speak against it.
+bool follow_nonlinear(Trial& trial, const Trial& base, double least);
+
+/// The fit of a problem with its effects at work, by the road that a diagnosis takes to them: the best fit with nothing missing, the linear effects together, the nonlinear
+/// ones one after the other, and all over again from first guesses where they leave more than the noise.
+Arrival arrive_at_effects(const FitProblem& problem);
+
+/// Fits a prepared trial with everything free, while the weights of the runs return to those of their noise, in so many rounds.
+void fit_fully(Trial& trial, int rounds);
+
+/// Follows its nonlinear laws in so many times the steps that they ask for, and fits again.
+void follow_finer(Trial& trial, Eigen::Index times);
+
+/// The same all over again from first guesses, with windows that grow from a few periods: for effects without which the rig's parameters go far astray. Keeps the better.
+void fit_from_first_guesses(const FitProblem& problem, Trial& trial);
+
+}  // namespace unrig

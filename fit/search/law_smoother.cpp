@@ -1,0 +1,284 @@
+#include "fit/search/law_smoother.h"
+
+#include <Eigen/LU>
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "core/propagate/feedback_force.h"
+#include "core/model/run_inputs.h"
+
+namespace unrig {
+namespace {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::RowVectorXd;
+using Eigen::VectorXd;
+
+/// Reflects the rows such that the first `pivots` columns are upper triangular (Householder); the other columns follow.
+void triangularise(Eigen::Ref<MatrixXd> rows, Index pivots) {
+  for (Index j = 0; j < std::min(pivots, rows.rows() - 1); ++j) {
+    auto below = rows.col(j).tail(rows.rows() - j);
+    const double length = below.stableNorm();
+    if (!(length > 0)) continue;
+    const double end = below[0] > 0 ? -length : length;
+    below[0] -= end;  // the reflector, in the place of what it takes away
+    const double half = -end * below[0];
+    for (Index k = j + 1; k < rows.cols(); ++k) {
+      auto other = rows.col(k).tail(rows.rows() - j);
+      other -= below.dot(other) / half * below;
+    }
+    below.setZero();
+    below[0] = end;
+  }
+}
+
+}  // namespace
+
+LawSmoother::LawSmoother(const RunResidual& run, std::vector<Index> parameters) : run_(run), parameters_(std::move(parameters)), inputs_(run_inputs(run.run(), run.conditions())), free_(run.free_states()) {
+  const std::vector<std::string> names = run.model().output_channels(run.run());
+  const LinearSystem first = run.model().system(run.conditions(), run.model().start_values(), names);
+  for (const Feedback& f : first.feedback) parts_ = std::max(parts_, std::min(most_parts, f.steps_per_sample));
+  readings_ = std::min(run.run().samples(), most_samples);
+  samples_ = (readings_ - 1) * parts_ + 1;
+  channels_ = static_cast<Index>(names.size());
+  changes_ = static_cast<Index>(parameters_.size());
+  measured_ = weight_ = MatrixXd::Zero(samples_, channels_);
+  for (Index c = 0; c < channels_; ++c) {
+    const VectorXd& value = run.run().channel(names[static_cast<std::size_t>(c)]).value;
+    const VectorXd weight = run.channel_weight(static_cast<std::size_t>(c));
+    for (Index k = 0; k < readings_; ++k)
+      if (weight[k] > 0) {
+        weight_(k * parts_, c) = weight[k];
+        measured_(k * parts_, c) = value[k];
+      }
+  }
+  if (parts_ > 1 && inputs_.cols() > 0) {  // straight between samples
+    const MatrixXd at_samples = inputs_;
+    inputs_.resize(samples_, at_samples.cols());
+    for (Index k = 0; k < samples_; ++k) {
+      const double part = static_cast<double>(k % parts_) / static_cast<double>(parts_);
+      inputs_.row(k) = (1 - part) * at_samples.row(k / parts_) + part * at_samples.row(std::min(k / parts_ + 1, at_samples.rows() - 1));
+    }
+  }
+}
+
+void LawSmoother::prepare(const VectorXd& theta) {
+  system_ = run_.model().system(run_.conditions(), theta, run_.model().output_channels(run_.run()));
+  exact_ = exact_step(system_, run_.run().dt / static_cast<double>(parts_));
+  states_ = system_.states();
+  laws_ = static_cast<Index>(system_.feedback.size());
+  disturbances_ = laws_ + system_.coordinates;
+  gamma0_ = exact_.input0.value.rightCols(laws_);
+  gamma1_ = exact_.input1.value.rightCols(laws_);
+  if (disturb_.size() == 0) {  // kept: a theta that makes a law stronger must not make its error cheaper
+    disturb_.resize(states_, disturbances_);
+    disturb_ << gamma0_ + gamma1_, exact_.dt * MatrixXd::Identity(states_, states_).middleCols(system_.coordinates, system_.coordinates);
+  }
+  arguments_ = Arguments(system_);
+  before_ = gamma0_(Eigen::all, arguments_.owner);
+  behind_ = gamma1_(Eigen::all, arguments_.owner);
+}
+
+VectorXd LawSmoother::enough_to_move(const VectorXd& theta) {
+  prepare(theta);
+  MatrixXd state = disturb_;
+  VectorXd answer = VectorXd::Zero(disturbances_);
+  for (Index k = 1; k < samples_; ++k, state = exact_.transition.value * state) answer += (system_.C.value * state).colwise().squaredNorm().transpose();
+  const MatrixXd readings = measured_(Eigen::seqN(0, readings_, parts_), Eigen::all), moves = readings.rowwise() - readings.colwise().mean();
+  return (moves.squaredNorm() / static_cast<double>(readings_) / answer.array().max(1e-300)).sqrt();
+}
+
+/// Forces of the laws along the trajectory, and their derivatives.
+void LawSmoother::look_at_laws(const VectorXd& theta) {
+  force_ = MatrixXd::Zero(laws_, samples_);
+  slope_ = MatrixXd::Zero(arguments_.count(), samples_);
+  law_partial_ = MatrixXd::Zero(laws_, changes_ * samples_);
+  if (!followed_) {
+    state_ = MatrixXd::Zero(states_, samples_);
+    offset_ = VectorXd::Zero(channels_);
+    return;
+  }
+  const MatrixXd seen = arguments_.sees * state_;
+  for (Index k = 0; k < samples_; ++k)
+    for (Index i = 0; i < laws_; ++i) {
+      const Feedback& f = system_.feedback[static_cast<std::size_t>(i)];
+      const Index first = arguments_.first[static_cast<std::size_t>(i)];
+      const FeedbackForce at_z = force_of(f, seen.col(k).data() + first, theta);
+      force_(i, k) = at_z.value;
+      for (Index a = 0; a < f.sees.rows(); ++a) slope_(first + a, k) = at_z.slope[static_cast<std::size_t>(a)];
+      for (Index a = 0; a < changes_; ++a)
+        if (const Index own = parameters_[static_cast<std::size_t>(a)] - f.first_parameter; own >= 0 && own < f.parameters) law_partial_(i, k * changes_ + a) = at_z.partial[static_cast<std::size_t>(own)];
+    }
+}
+
+/// What a change of theta does to every step along the trajectory, at fixed forces: a column per step, parameter below parameter.
+MatrixXd LawSmoother::moved_by_theta() const {
+  const Index steps = samples_ - 1, given = system_.B.cols() - laws_;
+  MatrixXd drive(states_ + 2 * laws_ + 2 * given, steps);
+  drive.topRows(states_) = state_.leftCols(steps);
+  drive.middleRows(states_, laws_) = force_.leftCols(steps);
+  drive.middleRows(states_ + laws_, laws_) = force_.rightCols(steps);
+  if (given > 0) {
+    drive.middleRows(states_ + 2 * laws_, given) = inputs_.topRows(steps).transpose();
+    drive.bottomRows(given) = inputs_.middleRows(1, steps).transpose();
+  }
+  MatrixXd by_parameter = MatrixXd::Zero(states_ * changes_, drive.rows());
+  for (Index a = 0; a < changes_; ++a) {
+    const Index j = parameters_[static_cast<std::size_t>(a)];
+    auto part = by_parameter.middleRows(a * states_, states_);
+    if (exact_.transition.depends_on(j)) part.leftCols(states_) = exact_.transition.d(j);
+    if (exact_.input0.depends_on(j)) {
+      part.middleCols(states_, laws_) = exact_.input0.d(j).rightCols(laws_);
+      part.middleCols(states_ + 2 * laws_, given) = exact_.input0.d(j).leftCols(given);
+    }
+    if (exact_.input1.depends_on(j)) {
+      part.middleCols(states_ + laws_, laws_) = exact_.input1.d(j).rightCols(laws_);
+      part.rightCols(given) = exact_.input1.d(j).leftCols(given);
+    }
+  }
+  return by_parameter * drive;
+}
+
+/// x_{k+1} near the trajectory, where the force at the end of the step is solved for.
+void LawSmoother::write_step(Index k, const Eigen::Ref<const MatrixXd>& moved) {
+  const Index given = system_.B.cols() - laws_;
+  const auto now = slope_.col(k), then = slope_.col(k + 1);
+  const MatrixXd& sees = arguments_.sees;
+  MatrixXd& step = ahead_[static_cast<std::size_t>(k)];
+  step.resize(states_, states_ + disturbances_ + changes_ + 1);
+  step.leftCols(states_) = exact_.transition.value + before_ * now.asDiagonal() * sees;
+  step.middleCols(states_, disturbances_) = disturb_;
+  step.middleCols(states_ + disturbances_, changes_) = moved + gamma0_ * law_partials(k) + gamma1_ * law_partials(k + 1);
+  step.rightCols(1) = gamma0_ * force_.col(k) - before_ * now.cwiseProduct(sees * state_.col(k)) + gamma1_ * force_.col(k + 1) - behind_ * then.cwiseProduct(sees * state_.col(k + 1));
+  if (given > 0) step.rightCols(1) += exact_.input0.value.leftCols(given) * inputs_.row(k).transpose() + exact_.input1.value.leftCols(given) * inputs_.row(k + 1).transpose();
+  if (followed_ && laws_ > 0) {  // (1 - gamma1 slope sees)^-1, of low rank
+    const MatrixXd pushed = behind_ * then.asDiagonal();
+    step += pushed * (MatrixXd::Identity(pushed.cols(), pushed.cols()) - sees * pushed).partialPivLu().solve(sees * step);
+  }
+}
+
+/// A reading near the trajectory, in units of its noise, over [x | change | offsets | right].
+void LawSmoother::write_reading(Index k, Index channel, Eigen::Ref<RowVectorXd> row) const {
+  const double w = weight_(k, channel);
+  const Index given = system_.B.cols() - laws_;
+  const auto direct = system_.D.value.row(channel).tail(laws_);
+  const RowVectorXd by_argument = direct(arguments_.owner).cwiseProduct(slope_.col(k).transpose());
+  row.head(states_) = w * (system_.C.value.row(channel) + by_argument * arguments_.sees);
+  for (Index a = 0; a < changes_; ++a) {
+    const Index j = parameters_[static_cast<std::size_t>(a)];
+    double change = direct.dot(law_partials(k).col(a));
+    if (system_.C.depends_on(j)) change += system_.C.d(j).row(channel).dot(state_.col(k));
+    if (system_.D.depends_on(j)) change += system_.D.d(j).row(channel).tail(laws_).dot(force_.col(k));
+    row[states_ + a] = w * change;
+  }
+  row[states_ + changes_ + channel] = w;
+  double known = direct.dot(force_.col(k)) - by_argument.dot(arguments_.sees * state_.col(k));
+  if (given > 0) known += system_.D.value.row(channel).head(given).dot(inputs_.row(k));
+  row[row.size() - 1] = w * (measured_(k, channel) - known);
+}
+
+LawSmoother::Information LawSmoother::information(const VectorXd& theta, const VectorXd& sigma) {
+  prepare(theta);
+  look_at_laws(theta);
+  constexpr Index stack = 32;  // samples whose readings are put together before they are triangularised
+  const Index steps = samples_ - 1, n = states_, u = disturbances_, all = n + changes_ + channels_;
+  const MatrixXd moved = moved_by_theta();
+  ahead_.resize(static_cast<std::size_t>(steps));
+  best_disturbance_.resize(static_cast<std::size_t>(steps));
+  // What all later samples say: of the state behind the step over [x | change | offsets | right], and of [change | offsets | right] beside any state.
+  const Index beside = changes_ + channels_ + 1;
+  MatrixXd later = MatrixXd::Zero(n, n + beside), known = MatrixXd::Zero(beside + channels_ * stack, beside);
+  MatrixXd rows(n + u + channels_, u + n + beside);
+  RowVectorXd row(all + 1);
+  Index filled = beside;
+  for (Index k = steps; k >= 0; --k) {
+    rows.setZero();
+    if (k < steps) {
+      write_step(k, Eigen::Map<const MatrixXd>(moved.col(k).data(), n, changes_));
+      const MatrixXd& step = ahead_[static_cast<std::size_t>(k)];
+      const auto of_state = later.leftCols(n).triangularView<Eigen::Upper>();
+      rows.topLeftCorner(n, u) = of_state * step.middleCols(n, u);
+      rows.block(0, u, n, n) = of_state * step.leftCols(n);
+      rows.topRightCorner(n, beside) = later.rightCols(beside);
+      rows.block(0, u + n, n, changes_) += of_state * step.middleCols(n + u, changes_);
+      rows.topRightCorner(n, 1) -= of_state * step.rightCols(1);
+      rows.block(n, 0, u, u).diagonal() = sigma.cwiseInverse();
+    }
+    for (Index c = 0; c < channels_; ++c)
+      if (weight_(k, c) > 0) {
+        row.setZero();
+        write_reading(k, c, row);
+        rows.row(n + u + c).tail(all + 1) = row;
+      }
+    triangularise(rows, u + n);
+    if (k < steps) best_disturbance_[static_cast<std::size_t>(k)] = rows.topRows(u);
+    later = rows.block(u, u, n, all + 1);
+    known.middleRows(filled, channels_) = rows.bottomRightCorner(channels_, beside);
+    filled += channels_;
+    if (filled == known.rows() || k == 0) {
+      triangularise(known.topRows(filled), beside);
+      filled = beside;
+    }
+  }
+
+  // Of the first state only some is free; what the readings do not determine of it stays zero.
+  constexpr double hardly = 1e-9;
+  const auto free = static_cast<Index>(free_.size());
+  first_ = MatrixXd::Zero(n + beside + free, free + beside);
+  for (Index i = 0; i < free; ++i) {
+    first_.col(i).head(n) = later.col(free_[static_cast<std::size_t>(i)]);
+    first_(n + beside + i, i) = hardly * first_.col(i).norm() + 1e-300;
+  }
+  first_.block(0, free, n, beside) << later.middleCols(n + changes_, channels_), later.middleCols(n, changes_), later.rightCols(1);
+  first_.block(n, free, beside, beside) << known.block(0, changes_, beside, channels_), known.topLeftCorner(beside, changes_), known.topRightCorner(beside, 1);
+  triangularise(first_, first_.cols());
+  const Index solved = free + channels_;
+  return {first_.block(solved, solved, changes_, changes_), first_.block(solved, solved + changes_, changes_, 1)};
+}
+
+void LawSmoother::step(const VectorXd& change) {
+  const auto free = static_cast<Index>(free_.size());
+  const Index n = states_, u = disturbances_, solved = free + channels_;
+  const VectorXd start = first_.topLeftCorner(solved, solved)
+                             .triangularView<Eigen::Upper>()
+                             .solve(first_.topRows(solved).rightCols(1).col(0) - first_.block(0, solved, solved, changes_) * change);
+  offset_ = start.tail(channels_);
+  state_.col(0).setZero();
+  for (Index i = 0; i < free; ++i) state_(free_[static_cast<std::size_t>(i)], 0) = start[i];
+  disturbance_.resize(u, samples_ - 1);
+  VectorXd right(u);
+  for (Index k = 0; k + 1 < samples_; ++k) {
+    const MatrixXd &best = best_disturbance_[static_cast<std::size_t>(k)], &ahead = ahead_[static_cast<std::size_t>(k)];
+    right = best.rightCols(1);
+    right.noalias() -= best.middleCols(u, n) * state_.col(k);
+    right.noalias() -= best.middleCols(u + n, changes_) * change;
+    right.noalias() -= best.middleCols(u + n + changes_, channels_) * offset_;
+    disturbance_.col(k) = best.leftCols(u).triangularView<Eigen::Upper>().solve(right);
+    state_.col(k + 1) = ahead.rightCols(1);
+    state_.col(k + 1).noalias() += ahead.leftCols(n) * state_.col(k);
+    state_.col(k + 1).noalias() += ahead.middleCols(n, u) * disturbance_.col(k);
+    state_.col(k + 1).noalias() += ahead.middleCols(n + u, changes_) * change;
+  }
+  followed_ = true;
+}
+
+double LawSmoother::cost(const VectorXd& sigma) const {
+  const Index given = system_.B.cols() - laws_;
+  MatrixXd left = measured_ - (system_.C.value * state_ + system_.D.value.rightCols(laws_) * force_).transpose();
+  if (given > 0) left -= inputs_.topRows(samples_) * system_.D.value.leftCols(given).transpose();
+  left.rowwise() -= offset_.transpose();
+  return left.cwiseProduct(weight_).squaredNorm() + (sigma.cwiseInverse().asDiagonal() * disturbance_).squaredNorm();
+}
+
+VectorXd LawSmoother::disturbance() const { return (disturbance_.rowwise().squaredNorm() / static_cast<double>(disturbance_.cols())).cwiseSqrt(); }
+
+VectorXd LawSmoother::linear() const {
+  VectorXd c(static_cast<Index>(free_.size()) + channels_);
+  for (std::size_t i = 0; i < free_.size(); ++i) c[static_cast<Index>(i)] = state_(free_[i], 0);
+  c.tail(channels_) = offset_;
+  return c;
+}
+
+}  // namespace unrig

@@ -1,0 +1,82 @@
+#pragma once
+#include <functional>
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "core/files/provenance.h"
+#include "core/rig/rig.h"
+#include "core/run/run.h"
+
+namespace unrig {
+
+/// How well does `diagnose` find what is missing, with this rig and this noise?
+struct TrialProblem {
+  Rig rig;
+  std::vector<std::string> effects;  ///< hidden in turn, and the candidates of the diagnosis; empty: all
+  int trials = 20;
+  bool pairs = false;                ///< hide two effects at a time
+  bool outside = false;              ///< what is hidden is not among the candidates: nothing should be named
+  unsigned seed = 1;
+  std::vector<Run> recordings;       ///< whose conditions, motion, sampling and noise the simulated runs repeat; none: runs are drawn
+  std::optional<double> noise;       ///< of the gauge [N]; without it that of the recordings, or 0.03
+  std::size_t shard = 1, shards = 1; ///< only the trials i with i mod shards = shard - 1
+  std::string cases;                 ///< folder in which every trial's outcome is kept and found again; empty: none
+  std::function<void(const std::string&)> progress;  ///< called from one thread at a time
+};
+
+/// One campaign and what became of it.
+struct TrialOutcome {
+  std::size_t trial = 0;  ///< i of run_trials
+  std::vector<std::string> hidden, found;
+  std::vector<std::vector<std::string>> equivalent;  ///< sets that the diagnosis cannot tell from what it found
+  std::vector<double> parameters;
+  double size = 0;             ///< largest r.m.s. of a run that the hidden effects make, over the noise
+  std::vector<double> sizes;   ///< of each hidden effect by itself, in the order of `hidden`
+  bool mismatch = false, unexplained = false;
+  double seconds = 0;
+  std::string failure;         ///< what the diagnosis threw, if it did
+
+  bool right() const;          ///< exactly what was hidden was found
+  bool among_equivalent() const;
+};
+
+/// How often one effect was found.
+struct EffectScore {
+  int hidden = 0, found = 0, equivalent = 0;  ///< `equivalent`: not named, but among the sets that the diagnosis calls as good
+  double smallest_found = 0;      ///< smallest size that was found
+  double nine_in_ten = 0;         ///< least size from which on nine in ten were found; 0: there is none
+};
+
+struct TrialResult {
+  std::vector<TrialOutcome> outcomes;  ///< in the order of the trials
+  std::vector<std::string> effects;    ///< hidden in turn
+  int trials = 0;                      ///< of all shards together
+  std::size_t shard = 1, shards = 1;
+  std::string study;                   ///< fingerprint of all that the outcomes depend on (study_of)
+  std::map<std::string, std::map<std::string, int>> confusion;  ///< hidden set -> found set -> trials
+  std::map<std::string, EffectScore> scores;
+  int nulls = 0, false_alarms = 0;    ///< campaigns with nothing hidden, and those of them where something was named
+  int wrong_names = 0, misses = 0;    ///< with something hidden: an effect was named that was not there; nothing was named
+  int failures = 0;                   ///< campaigns that could not be drawn or diagnosed: in none of these counts
+  unsigned seed = 0;
+  std::vector<std::string> recordings;  ///< files that the simulated runs repeat
+  std::string rig_file, rig_fingerprint;          ///< core/rig/fingerprint.h
+  std::vector<std::string> recording_fingerprints;
+  double noise = 0;                     ///< of the gauge [N]; of several recordings the largest
+};
+
+/// Trial i hides nothing (i = 0 and every further round), or the next of `effects`, or it and another one; sizes and rigs are drawn anew from (seed, i), so
+/// that a trial depends on nothing but these two numbers.
+///
+/// Throws InputError where the rig cannot be plucked and pitched (trial_campaign.h), a recording cannot be repeated (trial_plan.h), or `outside` would leave no candidate.
+TrialResult run_trials(const TrialProblem& problem);
+
+/// The counts of `result.outcomes`.
+void tally(TrialResult& result);
+
+/// "nothing", or the names with " + " between them, in alphabetical order.
+std::string name_of(std::vector<std::string> effects);
+
+}  // namespace unrig

@@ -1,0 +1,137 @@
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <random>
+#include <string>
+#include <vector>
+
+#include "core/model/simulate.h"
+#include "fit/diagnose/diagnose.h"
+#include "fit/trial/trial_campaign.h"
+#include "tests/support/sample_data.h"
+
+namespace unrig {
+namespace {
+
+using testing::UnorderedElementsAre;
+
+using Strings = std::vector<std::string>;
+
+/// As `unrig trial --pairs` draws it, with its own runs or with runs like those of sample_data/campaigns/null.
+TrialCampaign pair(unsigned seed, unsigned trial, const Strings& hidden, bool like_recordings) {
+  std::seed_seq sequence{seed, trial};
+  std::mt19937_64 random(sequence);
+  std::uniform_int_distribution<std::size_t>(1, 14)(random);  // which the second effect is
+  const Rig rig = read_rig(test::null_campaign("rig.toml"));
+  std::vector<unrig::Run> recordings;
+  for (const char* run : {"dry_pluck", "wet_pluck", "step_a", "step_b", "step_c"})
+    if (like_recordings) recordings.push_back(read_run(test::null_campaign(std::string(run) + ".csv")));
+  const std::vector<PlannedRun> runs = like_recordings ? runs_like(rig, recordings, {}, random) : draw_runs(0.03, random);
+  return draw_campaign(rig, hidden, runs, random);
+}
+
+Diagnosis verdict_on(const TrialCampaign& campaign, const Strings& candidates) {
+  DiagnoseProblem problem;
+  problem.rig = campaign.rig;
+  problem.runs = campaign.runs;
+  problem.verdict_only = true;
+  problem.effects = candidates;
+  return diagnose(problem);
+}
+
+Strings found_in(const Diagnosis& d) {
+  Strings found;
+  for (const MissingEffect& m : d.missing) found.push_back(m.effect);
+  return found;
+}
+
+const Candidate* tried(const Diagnosis& d, const Strings& effects) {
+  const auto place = std::find_if(d.ranking.begin(), d.ranking.end(), [&](const Candidate& c) { return c.effects == effects; });
+  return place == d.ranking.end() ? nullptr : &*place;
+}
+
+/// A drag and a spring of much the same size. A wave with an amplitude for every run comes first, and the spring beside it leaves little; only in the wave's place does the drag come in.
+TEST(Selection, TheFirstToBeFoundIsExchangedForWhatItStoodInFor) {
+  const TrialCampaign campaign = pair(3002, 5, {"quadratic-drag", "cubic-stiffness"}, false);
+  ASSERT_GT(campaign.sizes[0], 30);
+  ASSERT_GT(campaign.sizes[1], 30);
+  const Diagnosis d = verdict_on(campaign, {"tank-wave", "cubic-stiffness", "quadratic-drag"});
+  EXPECT_TRUE(tried(d, {"tank-wave", "cubic-stiffness"})) << "otherwise this campaign tests nothing of the exchange";
+  EXPECT_THAT(found_in(d), UnorderedElementsAre("quadratic-drag", "cubic-stiffness"));
+  EXPECT_FALSE(d.unexplained);
+}
+
+/// Far from the data the spring alone is lost. Beside the friction it is not, and no wave has to stand in for it.
+TEST(Selection, ALawThatWasLostFarAwayIsTriedAgainNearTheData) {
+  const TrialCampaign campaign = pair(3601, 3, {"coulomb-friction", "cubic-stiffness"}, true);
+  ASSERT_GT(campaign.sizes[1], 10);
+  const Diagnosis d = verdict_on(campaign, {"tank-wave", "cubic-stiffness", "coulomb-friction"});
+  ASSERT_TRUE(tried(d, {"cubic-stiffness"}));
+  EXPECT_GT(tried(d, {"cubic-stiffness"})->delta_bic, 0) << "otherwise it was not lost";
+  EXPECT_THAT(found_in(d), UnorderedElementsAre("coulomb-friction", "cubic-stiffness"));
+  EXPECT_FALSE(d.unexplained);
+}
+
+/// The delay that comes first leaves what a filter leaves; with both at work the filter does nearly all, and rests at a limit because of the delay.
+TEST(Selection, WhatRestsAtALimitMayDoTheWorkOfTheEffectBeforeIt) {
+  const TrialCampaign campaign = pair(3502, 28, {"torsion-crosstalk", "gauge-lowpass"}, false);
+  ASSERT_LT(campaign.sizes[0], 1) << "below the noise";
+  const Diagnosis d = verdict_on(campaign, {"channel-delay", "gauge-lowpass", "tank-wave", "gauge-drift", "mains-hum", "separation-lag", "wagner-lag", "torsion-crosstalk"});  // so many that not all are fitted
+  EXPECT_TRUE(tried(d, {"channel-delay", "gauge-lowpass"})) << "otherwise the delay did not come first";
+  EXPECT_THAT(found_in(d), UnorderedElementsAre("gauge-lowpass"));
+  EXPECT_FALSE(d.unexplained);
+}
+
+/// With one mode neither friction nor the modes explain a rig of many modes that friction stops.
+TEST(Selection, AThinBasisDoesNotHideALaw) {
+  const TrialCampaign campaign = pair(3602, 33, {"higher-mode", "coulomb-friction"}, true);
+  const Diagnosis d = verdict_on(campaign, {"higher-mode", "coulomb-friction"});
+  ASSERT_TRUE(tried(d, {"coulomb-friction"}));
+  EXPECT_GT(tried(d, {"coulomb-friction"})->reduced_chi2, 100) << "otherwise friction is found without the modes";
+  EXPECT_THAT(found_in(d), UnorderedElementsAre("higher-mode", "coulomb-friction"));
+  EXPECT_FALSE(d.unexplained);
+}
+
+/// A friction of 544 times the noise, and hum below it: what following the friction in whole samples leaves had got a slower build-up and a separation, until finer steps left less and the rest no name.
+TEST(Selection, WhatIsLeftOfALawIsGivenNoNameThatDoesNotExplainIt) {
+  const TrialCampaign campaign = pair(3602, 19, {"coulomb-friction", "mains-hum"}, true);
+  ASSERT_LT(campaign.sizes[1], 0.3);
+  const Diagnosis d = verdict_on(campaign, {"coulomb-friction", "wagner-lag", "separation-lag"});
+  EXPECT_THAT(found_in(d), UnorderedElementsAre("coulomb-friction"));
+}
+
+/// Friction of 1.5 N that changes its sign within 0.16 mm/s: followed in whole samples it leaves 1.27 and 1.13 times the noise of the two decays, measured.
+TEST(Selection, SharpFrictionIsFollowedInFinerSteps) {
+  const Rig rig = read_rig(test::null_campaign("rig.toml"));
+  const AeroelasticModel model = AeroelasticModel(rig, make_basis(rig, 1000, 998.2), wagner(Wagner::within_1e6)).with_effects({"coulomb-friction"});
+  std::mt19937_64 random(1);
+  std::normal_distribution<double> normal;
+  DiagnoseProblem problem;
+  problem.rig = rig;
+  problem.verdict_only = true;
+  problem.effects = {"coulomb-friction", "wagner-lag", "quadratic-drag"};
+  for (const char* name : {"dry_pluck", "wet_pluck"}) {
+    const PlannedRun planned = runs_like(rig, {read_run(test::null_campaign(std::string(name) + ".csv"))}, {}, random).front();
+    SimulateProblem truth{model, model.start_values(), planned.fine, {}, planned.release, {}};
+    truth.theta[model.index("coulomb-friction.force")] = 1.5;
+    truth.theta[model.index("coulomb-friction.velocity")] = 1.6e-4;
+    unrig::Run run = every_nth(simulate(truth).run, PlannedRun::finer);
+    for (Channel& c : run.channels)
+      for (double& reading : c.value) reading += (c.name == "gauge" ? planned.noise : planned.angle_noise) * normal(random);
+    problem.runs.push_back(std::move(run));
+  }
+  const Diagnosis d = diagnose(problem);
+  EXPECT_THAT(found_in(d), UnorderedElementsAre("coulomb-friction"));
+  EXPECT_FALSE(d.unexplained) << d.remaining.summary;
+}
+
+/// The decays cross the corners for seconds, and are explained by a law that is trusted to within some per cent; the steps are followed to the noise from what the decays tell.
+TEST(Selection, StepsOfARigWithAGapAreFollowedToTheNoise) {
+  const Diagnosis d = verdict_on(pair(3902, 5, {"freeplay"}, true), {"freeplay", "coulomb-friction", "wagner-lag"});
+  EXPECT_THAT(found_in(d), UnorderedElementsAre("freeplay"));
+  EXPECT_FALSE(d.unexplained) << d.remaining.summary;
+}
+
+}  // namespace
+}  // namespace unrig

@@ -1,0 +1,195 @@
+#include "fit/givens/inexact_rig.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <random>
+
+#include <nlohmann/json.hpp>
+
+#include "core/files/text_file.h"
+#include "fit/fit.h"
+#include "fit/fit_files.h"
+#include "fit/givens/price.h"
+#include "tests/support/sample_data.h"
+#include "tests/support/slope_check.h"
+#include "tests/support/stated.h"
+
+namespace unrig {
+namespace {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+using ::testing::HasSubstr;
+
+const std::vector<std::string> plucks{"dry_pluck", "wet_pluck"}, five_runs{"dry_pluck", "wet_pluck", "step_a", "step_b", "step_c"};
+
+FitProblem null_problem(const std::vector<std::string>& runs) {
+  FitProblem problem;
+  problem.rig = read_rig(test::null_campaign("rig.toml"));
+  for (const std::string& run : runs) problem.runs.push_back(read_run(test::null_campaign(run + ".csv")));
+  return problem;
+}
+
+Rig rig_that_states(const std::string& statement) { return test::rig_of_text(test::with_masses_stated(read_text(test::null_campaign("rig.toml")), statement)); }
+
+const FittedParameter& parameter(const FitResult& result, const std::string& name, const std::string& run = "") {
+  for (const FittedParameter& p : result.parameters)
+    if (p.name == name && p.run.find(run) != std::string::npos) return p;
+  ADD_FAILURE() << "no parameter " << name << " of run " << run;
+  return result.parameters.front();
+}
+
+double truth(const std::string& name) { return nlohmann::json::parse(read_text(test::source_path("sample_data/campaigns/KEY.json")))["null"]["truth"][name].get<double>(); }
+
+/// A calibration of the gauge that is known to one per cent, the same in all runs.
+std::shared_ptr<const Givens> one_per_cent_of_the_calibration() {
+  Givens g;
+  g.numbers = {{GivenNumber::calibration, -1, -1, "calibration", "N/V", 1, 0.01}};
+  g.spread = MatrixXd::Constant(1, 1, 0.01);
+  g.group = {"calibration"};
+  g.common = {true};
+  return std::make_shared<const Givens>(g);
+}
+
+TEST(NumberSlopes, AreTheSlopesOfTheResidual) {
+  FitProblem problem = null_problem({"wet_pluck"});
+  problem.rig = rig_that_states("mass.std_percent = 1.0");
+  problem.runs = {test::run_that_states(test::null_campaign("wet_pluck.csv"), "clock_std_percent = 0.1\n# density_std_percent = 0.5")};
+  const StatedNumbers numbers(problem.rig, problem.runs);
+  ASSERT_EQ(numbers.deviations(), 17 + 2);
+  const auto model = std::make_shared<const AeroelasticModel>(model_of(problem.rig, problem.runs, problem.circulation));
+  const VectorXd theta = model->start_values();
+  Arrival at{model, {{}}, JointProblem(*model, {RunResidual(*model, problem.runs.front(), {})})};
+  const RunResidual& run = at.joint.runs().front();
+  const NumberSlopes slopes = number_slopes(at, numbers, VectorXd::Zero(19));
+  const MatrixXd slope = -slopes.runs.front().channels.front().slope.rightCols(19);
+  const auto residual = [&](const VectorXd& z) -> VectorXd {
+    const Rig rig = numbers.rig_at(z);
+    const unrig::Run moved = numbers.run_at(0, z);
+    const AeroelasticModel there(rig, make_basis(rig, model->basis().normal_modes, model->basis().torsion_modes), model->circulation());
+    RunResidual other(there, moved, {});
+    other.keep_noise_of(run);
+    return run.channel_weight(0).cwiseProduct(moved.channel("gauge").value - other.predict(theta).output.col(0));
+  };
+  for (const Index k : {Index{0}, Index{12}, Index{16}, Index{17}, Index{18}}) {
+    const test::Slope found = test::slope_along(residual, slope, VectorXd::Zero(19), VectorXd::Unit(19, k), 0.03, 1e-10);
+    EXPECT_TRUE(found.exact || found.order > 1.8) << numbers.groups()[static_cast<std::size_t>(k)] << ": order " << found.order;
+  }
+}
+
+TEST(InexactRig, NumbersKnownToAMillionthLeaveTheFitAsItIs) {
+  const FitResult exact = fit(null_problem(plucks));
+  FitProblem stated = null_problem(plucks);
+  stated.rig = rig_that_states("mass.std_percent = 1e-6");
+  const FitResult tight = fit(stated);
+  ASSERT_EQ(tight.givens.size(), 17u);
+  for (const FittedParameter& p : exact.parameters) {
+    if (!p.identified) continue;
+    const FittedParameter& q = parameter(tight, p.name);
+    EXPECT_NEAR(q.value, p.value, 0.05 * p.std_error) << p.name;
+    EXPECT_NEAR(q.std_error / p.std_error, 1, 0.02) << p.name;
+  }
+}
+
+/// Masses, stiffness and apparent mass that are all larger by the same part move the same: the recordings say nothing of what is common to the masses.
+TEST(InexactRig, WhatTheRecordingsCannotTellStaysInTheErrors) {
+  FitProblem problem = null_problem(plucks);
+  problem.rig = rig_that_states("mass.common_std_percent = 1.0");
+  const FitResult result = fit(problem);
+  for (const char* name : {"normal.stiffness_scale", "apparent_mass_coefficient"}) {
+    const FittedParameter& p = parameter(result, name);
+    EXPECT_NEAR(p.std_error / p.value, 0.01, 3e-4) << name;
+  }
+  for (const FittedGiven& g : result.givens) {
+    EXPECT_NEAR(g.std_error / g.stated_std, 1, 0.02) << g.name;
+    EXPECT_NEAR((g.value - g.stated) / g.stated_std, 0, 0.2) << g.name;
+  }
+  // They go together: one per cent in the one is one per cent in the other.
+  const auto kn = static_cast<Index>(&parameter(result, "normal.stiffness_scale") - result.parameters.data()), mass = static_cast<Index>(result.parameters.size()) + 12;
+  const MatrixXd& c = result.joint_covariance;
+  EXPECT_GT(c(kn, mass) / std::sqrt(c(kn, kn) * c(mass, mass)), 0.999);
+}
+
+/// Recordings of another program, and rig files whose masses were drawn around its own.
+TEST(InexactRig, ErrorsCoverMassesThatAreOffByWhatIsStated) {
+  const double kn = truth("kn"), ca = truth("Ca");
+  double sum = 0, most_without = 0;
+  int count = 0;
+  for (const unsigned seed : {1u, 2u, 3u, 4u, 5u, 6u}) {
+    std::mt19937 random(seed);
+    std::normal_distribution<double> one_per_cent(1, 0.01);
+    FitProblem problem = null_problem(plucks);
+    for (double& mass : problem.rig.normal.inertia) mass *= one_per_cent(random);
+    if (seed == 1) most_without = std::abs(parameter(fit(problem), "normal.stiffness_scale").value - kn) / parameter(fit(problem), "normal.stiffness_scale").std_error;
+    Rig stated = rig_that_states("mass.std_percent = 1.0");
+    Givens givens = *stated.givens;
+    for (Index k = 0; k < 17; ++k) {
+      Given& g = givens.numbers[static_cast<std::size_t>(k)];
+      g.value = problem.rig.normal.inertia[k];
+      g.std = givens.spread(k, k) = 0.01 * g.value;
+    }
+    problem.rig.givens = std::make_shared<const Givens>(givens);
+    const FitResult result = fit(problem);
+    EXPECT_TRUE(result.converged) << result.message;
+    for (const auto& [name, value] : {std::pair{"normal.stiffness_scale", kn}, {"apparent_mass_coefficient", ca}}) {
+      const FittedParameter& p = parameter(result, name);
+      sum += std::pow((p.value - value) / p.std_error, 2);
+      ++count;
+    }
+  }
+  EXPECT_GT(most_without, 30) << "standard deviations, when the rig file is taken for exact";
+  // Chi-square of 12 squares lies within these with a probability of 99.8 %.
+  EXPECT_EQ(count, 12);
+  EXPECT_GT(sum, 2.2);
+  EXPECT_LT(sum, 32.9);
+}
+
+TEST(InexactRig, ACalibrationIsAsUncertainAsTheSlopesAreAndLeavesTheRigAlone) {
+  const FitResult exact = fit(null_problem(five_runs));
+  FitProblem problem = null_problem(five_runs);
+  for (unrig::Run& run : problem.runs) run.givens = one_per_cent_of_the_calibration();
+  const FitResult result = fit(problem);
+  const FittedParameter &slope = parameter(result, "normal_force_slope", "step_b"), &kn = parameter(result, "normal.stiffness_scale");
+  EXPECT_NEAR(slope.std_error / slope.value, 0.01, 1e-3);
+  EXPECT_NEAR(kn.std_error / parameter(exact, "normal.stiffness_scale").std_error, 1, 0.05);
+  EXPECT_EQ(result.runs.front().fingerprint, exact.runs.front().fingerprint) << "the recording is the same";
+}
+
+TEST(InexactRig, ItsFileHoldsTheNumbersAndComesBack) {
+  FitProblem problem = null_problem(plucks);
+  problem.rig = rig_that_states("mass.std_percent = 1.0");
+  const FitResult result = fit(problem);
+  const test::TemporaryDirectory directory;
+  const FittedRig back = read_fit(directory.file("fit.json", to_json(result)));
+  ASSERT_EQ(back.givens.size(), 17u);
+  EXPECT_EQ(back.givens[12].name, "normal.mass[13]");
+  EXPECT_EQ(back.givens[12].value, result.givens[12].value);
+  EXPECT_EQ(back.joint_covariance, result.joint_covariance);
+  EXPECT_THAT(report(result), HasSubstr("[[Givens]]"));
+}
+
+TEST(Price, OfOnePerCentIsWhatFitsOfChangedFilesGave) {
+  const FitProblem problem = null_problem(five_runs);
+  const PriceList list = price_of_numbers(problem, fit(problem));
+  const auto of = [&](const std::string& group, const std::string& name) {
+    for (const Price& price : list.prices)
+      for (std::size_t i = 0; price.group == group && i < list.names.size(); ++i)
+        if (list.names[i] == name) return price.change[static_cast<Index>(i)];
+    ADD_FAILURE() << group << ", " << name;
+    return 0.0;
+  };
+  constexpr double printed = 0.1;  // per cent, to which the numbers are given
+  EXPECT_NEAR(of("normal.mass", "normal.stiffness_scale"), 1, printed);
+  EXPECT_NEAR(of("normal.mass", "apparent_mass_coefficient"), 1, printed);
+  EXPECT_NEAR(of("section.chord", "apparent_mass_coefficient"), -2, printed);
+  EXPECT_NEAR(of("section.chord", "normal_force_slope"), -0.8, printed);
+  EXPECT_NEAR(of("speed", "normal_force_slope"), -1.9, printed);
+  EXPECT_NEAR(of("clock", "normal.stiffness_scale"), -0.2, printed / 10);
+  EXPECT_NEAR(of("density", "apparent_mass_coefficient") / 2, -0.5, printed / 2);
+}
+
+}  // namespace
+}  // namespace unrig
