@@ -131,12 +131,6 @@ std::vector<int> TomlTable::integers(std::string_view key) const {
   return values;
 }
 
-std::vector<double> TomlTable::numbers(std::string_view key) const {
-  std::vector<double> values;
-  for (const toml::node& node : array(key, "wanted a list of numbers")) values.push_back(finite(node, key, fmt::format("[{}]", values.size() + 1)));
-  return values;
-}
-
 std::vector<std::string> TomlTable::texts(std::string_view key) const {
   std::vector<std::string> values;
   for (const toml::node& node : array(key, "wanted a list of texts in double quotes")) {

@@ -46,7 +46,6 @@ class TomlTable {
   bool boolean_or(std::string_view key, bool fallback) const;
   int integer(std::string_view key) const;
   std::vector<int> integers(std::string_view key) const;
-  std::vector<double> numbers(std::string_view key) const;
   std::vector<std::string> texts(std::string_view key) const;
   /// A list of plain numbers.
   Eigen::VectorXd numbers(std::string_view key) const;
