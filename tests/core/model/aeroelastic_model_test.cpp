@@ -358,6 +358,21 @@ TEST(AeroelasticModel, CarriesItsSlopesWithFreeCirculation) {
   expect_slopes(seed_model(2, 1, Wagner::jones, Circulation::free), stream(0.6), gauge);
 }
 
+/// Two modes and a sensor of every kind.
+Rig modal_rig_with_sensors() {
+  Rig rig = modal_rig();
+  rig.sensors = seed_rig().sensors;
+  rig.modal[0].sensor_shape = {1, 0.9, 0.8, 2, 2.5};
+  rig.modal[1].sensor_shape = {-0.4, 0.5, -0.6, 3, 0};
+  return rig;
+}
+
+TEST(AeroelasticModel, CarriesItsSlopesAsModesWithSensors) {
+  Conditions c = still(0);
+  c.force = c.mount = true;
+  expect_slopes(AeroelasticModel(modal_rig_with_sensors(), {}, wagner(Wagner::jones)), c, every_channel);
+}
+
 TEST(AeroelasticModel, CarriesItsSlopesAsModes) {
   Conditions c = still(0);
   c.force = c.mount = true;
@@ -387,6 +402,40 @@ TEST(ModalModel, AMountThatAcceleratesIsAForceTheOtherWay) {
   const LinearSystem s = model.system(c, model.start_values(), gauge);
   EXPECT_LT((s.B.value.col(2).segment(2, 2) + Eigen::Vector2d(1, 1)).norm(), 1e-14) << "m q'' = -m a at the start values";
   EXPECT_LT((s.B.value.col(0).segment(2, 2) - Eigen::Vector2d(1 / 1.5, 1 / 0.4)).norm(), 1e-14);
+}
+
+/// A rate is the slope of what it is the rate of, under a force that is smooth; here all sensors sit in one place.
+TEST(ModalModel, RatesAndAccelerationsOfSensorsAreSlopes) {
+  Rig rig = modal_rig_with_sensors();
+  for (ModalMode& m : rig.modal) std::fill(m.sensor_shape.begin(), m.sensor_shape.end(), m.sensor_shape.front());
+  for (Sensor& s : rig.sensors) s.gain = 1;
+  const AeroelasticModel model(rig, {}, wagner(Wagner::jones));
+  Conditions c = still(0);
+  c.force = true;
+  constexpr double dt = 1e-4;
+  constexpr Index n = 2000;
+  MatrixXd force(n + 1, 1);
+  for (Index k = 0; k <= n; ++k) force(k, 0) = 1 - std::cos(20 * dt * static_cast<double>(k));
+  const LinearSystem s = model.system(c, model.start_values(), every_channel);
+  const MatrixXd y = drive(s, exact_step(s, dt), DualMatrix(MatrixXd::Zero(4, 1)), n, {}, force, Partials::none).output;
+  const auto slope = [&](Index column) -> VectorXd { return (y.col(column).tail(n - 2) - y.col(column).head(n - 2)) / (2 * dt); };
+  const auto misses = [&](Index of, Index rate) { return (slope(of) - y.col(rate).segment(1, n - 2)).cwiseAbs().maxCoeff() / y.col(rate).cwiseAbs().maxCoeff(); };
+  const double second_order = std::pow(2 * pi * 31 * dt, 2);  // of the central difference, at the higher mode's frequency
+  EXPECT_LT(misses(1, 2), second_order);
+  EXPECT_LT(misses(2, 3), second_order);
+  EXPECT_LT(misses(4, 5), second_order);
+}
+
+/// A mode much stiffer than the motion is slow: the sensor goes with the mount.
+TEST(ModalModel, ASensorIsCarriedAlongByTheMount) {
+  const AeroelasticModel model(modal_rig_with_sensors(), {}, wagner(Wagner::jones));
+  Conditions c = still(0);
+  c.mount = true;
+  const LinearSystem s = model.system(c, model.start_values(), every_channel);
+  const RowVectorXd from_rest = s.D.value.col(0).transpose();
+  EXPECT_EQ(from_rest, (RowVectorXd(6) << 0, 0, -1, 0, 0, 0).finished()) << "the gain of the velocity is -1";
+  // Both modes have their mass as participation: at once they are left behind by the mount's acceleration, by shape each.
+  EXPECT_NEAR(s.D.value(3, 1), -1 * (1 - 0.8 + 0.6), 1e-14);
 }
 
 // ---------------------------------------------------------------------------------------------------------------- channels

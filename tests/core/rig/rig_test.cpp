@@ -340,6 +340,37 @@ TEST(ModalRig, WhatItMayNotBe) {
   EXPECT_THAT(refusal(modal + replaced(second, "N/m", "V/m")), HasSubstr("reads V for this mode and N for the first"));
 }
 
+const std::string modal_sensor = "[[sensor]]\ncolumn = \"acc\"\nreads = \"acceleration\"\n";
+
+/// Refused before: "[sensor] stands beside [[modal]]".
+TEST(ModalRig, EachModeMovesEachSensor) {
+  const Rig rig = read(modal + "sensor_shape = [1, -0.4]\n" + modal_sensor + "[[sensor]]\ncolumn = \"turn\"\nreads = \"twist_rate\"\ngain = \"0.5 V.s/rad\"\n");
+  ASSERT_EQ(rig.sensors.size(), 2u);
+  EXPECT_EQ(rig.sensors[0].reads, SensorKind::acceleration);
+  EXPECT_EQ(rig.sensors[0].unit, "m/s^2");
+  EXPECT_EQ(rig.sensors[1].gain, 0.5);
+  EXPECT_EQ(rig.modal[0].sensor_shape, (std::vector<double>{1, -0.4}));
+  EXPECT_EQ(rig.modal[0].gauge_gain, 1000);
+}
+
+TEST(ModalRig, ASensorStandsInForTheGauge) {
+  const Rig rig = read(without(modal, "gauge_gain", "") + "sensor_shape = [1]\n" + modal_sensor);
+  EXPECT_EQ(rig.modal[0].gauge_gain, 0);
+  EXPECT_THAT(refusal(without(modal, "gauge_gain", "")), HasSubstr("gauge_gain"));
+}
+
+TEST(ModalRig, SensorsThatDoNotFit) {
+  const std::string shaped = modal + "sensor_shape = [1]\n", second = replaced(shaped, "unrig_rig = 1\n", "");
+  EXPECT_EQ(refusal(shaped + second + modal_sensor), "no error");
+  EXPECT_THAT(refusal(modal + modal_sensor), AllOf(HasSubstr("modal[1].sensor_shape is missing"), HasSubstr("wanted 1 number, one per [[sensor]]")));
+  EXPECT_THAT(refusal(shaped), AllOf(HasSubstr("rig.toml:7: "), HasSubstr("in a rig without [[sensor]]")));
+  EXPECT_THAT(refusal(replaced(shaped, "[1]", "[1, 2]") + modal_sensor), AllOf(HasSubstr("rig.toml:7: "), HasSubstr("has 2 numbers"), HasSubstr("wanted 1, one per [[sensor]]")));
+  EXPECT_THAT(refusal(replaced(shaped, "[1]", "[\"1\"]") + modal_sensor), HasSubstr("modal[1].sensor_shape[1]"));
+  EXPECT_THAT(refusal(replaced(shaped, "[1]", "[0]") + modal_sensor), HasSubstr("that moves the sensor \"acc\""));
+  EXPECT_THAT(refusal(shaped + modal_sensor + "element = 3\n"), AllOf(HasSubstr("rig.toml:11: "), HasSubstr("has no elements")));
+  EXPECT_THAT(refusal(shaped + replaced(second, "gauge_gain = \"1000 N/m\"\n", "") + modal_sensor), HasSubstr("in every mode, or in none"));
+}
+
 // ------------------------------------------------------------------------------------------------------ what cannot be used
 
 struct Unusable {
