@@ -1,7 +1,7 @@
 // Law files: a law that can be evaluated, or InputError.
 #include <vector>
 
-#include "core/error.h"
+#include "core/files/error.h"
 #include "core/law/law.h"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
