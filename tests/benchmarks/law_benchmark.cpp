@@ -2,9 +2,9 @@
 
 #include <benchmark/benchmark.h>
 
-#include "core/feedback_force.h"
+#include "core/propagate/feedback_force.h"
 #include "core/law/law_effect.h"
-#include "core/nonlinear_response.h"
+#include "core/propagate/nonlinear_response.h"
 #include "tests/support/sample_data.h"
 
 namespace unrig {

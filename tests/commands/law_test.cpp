@@ -10,7 +10,7 @@
 
 #include <nlohmann/json.hpp>
 
-#include "core/text_file.h"
+#include "core/files/text_file.h"
 #include "tests/commands/run_unrig.h"
 
 namespace unrig {
