@@ -69,16 +69,28 @@ void LawSmoother::prepare(const VectorXd& theta) {
   exact_ = exact_step(system_, run_.run().dt / static_cast<double>(parts_));
   states_ = system_.states();
   laws_ = static_cast<Index>(system_.feedback.size());
-  disturbances_ = laws_ + system_.coordinates;
   gamma0_ = exact_.input0.value.rightCols(laws_);
   gamma1_ = exact_.input1.value.rightCols(laws_);
   if (disturb_.size() == 0) {  // kept: a theta that makes a law stronger must not make its error cheaper
+    const MatrixXd by_laws = (gamma0_ + gamma1_)(Eigen::all, laws_that_show());
+    disturbances_ = by_laws.cols() + system_.coordinates;
     disturb_.resize(states_, disturbances_);
-    disturb_ << gamma0_ + gamma1_, exact_.dt * MatrixXd::Identity(states_, states_).middleCols(system_.coordinates, system_.coordinates);
+    disturb_ << by_laws, exact_.dt * MatrixXd::Identity(states_, states_).middleCols(system_.coordinates, system_.coordinates);
   }
   arguments_ = Arguments(system_);
   before_ = gamma0_(Eigen::all, arguments_.owner);
   behind_ = gamma1_(Eigen::all, arguments_.owner);
+}
+
+/// Laws whose force reaches a channel through the linear part.
+std::vector<Index> LawSmoother::laws_that_show() const {
+  MatrixXd state = gamma0_ + gamma1_;
+  VectorXd seen = VectorXd::Zero(laws_);
+  for (Index k = 0; k <= states_; ++k, state = exact_.transition.value * state) seen += (system_.C.value * state).colwise().squaredNorm().transpose();
+  std::vector<Index> show;
+  for (Index i = 0; i < laws_; ++i)
+    if (seen[i] > 0) show.push_back(i);
+  return show;
 }
 
 VectorXd LawSmoother::enough_to_move(const VectorXd& theta) {

@@ -14,7 +14,7 @@ namespace unrig {
 ///   x_{k+1} = Phi x_k + Gamma0 f(z_k) + Gamma1 f(z_{k+1}) + G w_k + inputs,   y_k = C x_k + D f(z_k) + offset + noise
 ///
 /// with the least J = sum (noise / its sigma)^2 + sum (w / sigma)^2 over the first state, all w_k, the offsets and theta. The disturbances w_k are an error of every
-/// law and an unknown acceleration of every coordinate, constant over a step: a sample, or a part of it where a law asks for small steps. The laws see the trajectory that the data ask for instead of one that was
+/// law that the channels show by itself (not of a clock, nor of a memory that only another law looks at) and an unknown acceleration of every coordinate, constant over a step: a sample, or a part of it where a law asks for small steps. The laws see the trajectory that the data ask for instead of one that was
 /// followed from the start, so that an error of theirs does not grow along the record: J has no further minima as long as sigma is large, and as sigma
 /// shrinks, the trajectory becomes the model's own. Gauss-Newton, which eliminates the states from the last sample to the first: linear in the samples.
 /// Source: B. M. Bell, SIAM Journal on Optimization 4 (1994) 626, with theta as a further state.
@@ -51,6 +51,7 @@ class LawSmoother {
 
  private:
   void prepare(const Eigen::VectorXd& theta);
+  std::vector<Eigen::Index> laws_that_show() const;
   void look_at_laws(const Eigen::VectorXd& theta);
   Eigen::MatrixXd moved_by_theta() const;
   void write_step(Eigen::Index k, const Eigen::Ref<const Eigen::MatrixXd>& moved);

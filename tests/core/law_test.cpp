@@ -178,7 +178,7 @@ const std::string hysteresis = R"toml(unrig_law = 1
 name = "hysteresis"
 acts_on = "normal"
 force = "-f * z"
-memory = "v / xy * (1 - abs(z)^n * (b + (1 - b) * sign(v * z)))"
+memory = "v / xy * (1 - (b + (1 - b) * sign(v * z)) * abs(z)^n)"
 [parameters]
 f = { start = "1 N", lower = "0 N" }
 xy = { start = "1 mm", lower = "1e-6 m" }
@@ -233,6 +233,115 @@ TEST(LawEffect, IsWhatTheCompiledEffectIs) {
   const Rig rig = read_rig(test::null_campaign("rig.toml"));
   const std::string per_strip = std::to_string(0.5 * 998 * rig.chord * rig.strip_length);  // six digits behind the point
   expect_same(beam({file_of("-c * abs(v) * v * " + per_strip, "c = { start = 1 }\n", "", "lift")}), beam({}, {"quadratic-drag"}), VectorXd::Constant(1, 30), 0.01, 1e-6);
+}
+
+/// The law beside the effect, both evaluated alone: forces and derivatives at random arguments.
+TEST(LawEffect, MemoryHasTheRateOfTheCompiledOne) {
+  const AeroelasticModel law = beam({hysteresis}), effect = beam({}, {"bouc-wen"});
+  VectorXd theta = law.start_values();
+  theta.tail(4) << 8, 2e-3, 0.4, 1.3;
+  const LinearSystem a = law.system(stream(), theta, {"gauge"}), b = effect.system(stream(), theta, {"gauge"});
+  EXPECT_EQ((a.A.value - b.A.value).norm(), 0);
+  EXPECT_EQ((a.C.value - b.C.value).norm(), 0);
+  std::mt19937 random(3);
+  std::uniform_real_distribution<double> any(-1, 1);
+  for (int k = 0; k < 200; ++k) {
+    const double z[] = {k % 7 == 0 ? 0 : 0.1 * any(random), k % 5 == 0 ? 0 : any(random)};
+    const FeedbackForce left = force_of(a.feedback.at(0), z, theta), right = force_of(b.feedback.at(0), z, theta);
+    const auto near = [&](double x, double y) { EXPECT_NEAR(x, y, 1e-10 * std::max(1.0, std::abs(y))) << z[0] << " " << z[1]; };
+    near(left.value, right.value);
+    for (std::size_t i = 0; i < 2; ++i) near(left.slope[i], right.slope[i]);
+    for (std::size_t i = 0; i < 4; ++i) near(left.partial[i], right.partial[i]);
+  }
+}
+
+/// d output / d theta of the law's parameters is the slope of the response, wherever and whatever the law looks at.
+TEST(LawEffect, DerivativesOfTheResponseAreSlopesInEveryPlace) {
+  const std::string c = "c = { start = 1 }\n";
+  for (const std::string& text : {file_of("-c * tanh(300 * x) * (1 + 20 * v) + theta * twist", c), file_of("-c * twist^3 - c * twist_rate * theta_rate", c, "", "torsion"), file_of("c * alpha^3 * U^2", c, "", "lift"),
+                                  file_of("c * x * z", c, "memory = \"30 * alpha - 2 * z\"\n", "lift"), file_of("c * v^2 + c * t", c, "", "gauge"), file_of("c * sin(20 * t) + x * c^2", c, "", "mount"), file_of("-c * a", c),
+                                  file_of("-c * a - 1e9 * x^3", c), file_of("-c * z^3", c, "memory = \"1000 * v - z\"\n"), file_of("-0.1 * c * a", c, "", "lift"), file_of("c * a * 1e-3", c, "", "gauge")}) {
+    const AeroelasticModel model = beam({text});
+    VectorXd theta = model.start_values();
+    theta.tail(1)[0] = 0.4;
+    const NonlinearResponse there = response(model, stream(), theta, 3e-3);
+    ASSERT_TRUE(there.output.allFinite()) << text;
+    const auto f = [&](const VectorXd& y) -> VectorXd {
+      VectorXd at = theta;
+      at.tail(1) = y;
+      return response(model, stream(), at, 3e-3).output.col(0);
+    };
+    EXPECT_GT(there.tangent[0].rightCols(1).norm(), 0) << text;
+    EXPECT_TRUE(test::is_slope(f, there.tangent[0].rightCols(1), theta.tail(1), VectorXd::Constant(1, 0.1), 1e-11)) << text;
+  }
+}
+
+constexpr double mass = 2, stiffness = 800, dt = 0.002;
+
+/// Of a rig of one mode m q'' + k q = F, q(0) = 0.02 m, by the classical Runge-Kutta method; `force` of q, q', t and the memory, whose rate is `rate`.
+template <class Force, class Rate>
+VectorXd integrated(const Force& force, const Rate& rate, Index samples, double extra_mass = 0) {
+  constexpr int finer = 20;
+  const double h = dt / finer;
+  using State = Eigen::Vector3d;
+  const auto slope = [&](const State& s, double t) { return State(s[1], (force(s[0], s[1], t, s[2]) - stiffness * s[0]) / (mass + extra_mass), rate(s[0], s[1], s[2])); };
+  State s(0.02, 0, 0);
+  VectorXd q(samples);
+  for (Index k = 0; k < samples; ++k) {
+    q[k] = s[0];
+    for (int i = 0; i < finer; ++i) {
+      const double t = dt * static_cast<double>(k) + h * i;
+      const State a = slope(s, t), b = slope(s + h / 2 * a, t + h / 2), c = slope(s + h / 2 * b, t + h / 2), d = slope(s + h * c, t + h);
+      s += h / 6 * (a + 2 * b + 2 * c + d);
+    }
+  }
+  return q;
+}
+
+VectorXd simulated(const std::vector<std::string>& laws, Index samples) {
+  Rig rig;
+  rig.modal = {{mass, std::sqrt(stiffness / mass) / (2 * 3.14159265358979323846), 0, 1, "m"}};
+  std::vector<std::string> ids;
+  for (const std::string& law : laws) {
+    add_law(rig, parse_law(law, "law.toml"));
+    ids.push_back(rig.laws.back()->id);
+  }
+  const AeroelasticModel model = AeroelasticModel(rig, {}, {}).with_effects(ids);
+  const LinearSystem system = model.system({}, model.start_values(), {"gauge"});
+  VectorXd start = VectorXd::Zero(system.states());
+  start[0] = 0.02;
+  return follow(system, step_to_follow(system, dt), model.start_values(), {start, {}, MatrixXd(samples + 1, 0), MatrixXd(system.states(), 0), {}}, samples, Partials::none).output.col(0);
+}
+
+/// The straight force of a step is off by (w dt)^2/12 of itself (core/nonlinear_response.h), 1.3e-4 at 20 rad/s; laws of some tenths of the spring, over ten periods.
+constexpr double steps_own = 2e-3;
+
+std::string named(std::string law, const std::string& name) { return law.replace(law.find("mine"), 4, name); }
+
+TEST(LawEffect, MovesARigAsAnotherIntegratorDoes) {
+  const auto none = [](double, double, double) { return 0.0; };
+  constexpr Index samples = 1500;
+  const auto compare = [&](const VectorXd& a, const VectorXd& b) { EXPECT_LT((a - b).norm(), steps_own * b.norm()); };
+  const std::string drag = file_of("-c * abs(v)^p * sign(v)", "c = { start = \"2 N\" }\np = { start = 2 }\n"), hard = named(file_of("-k * x^3", "k = { start = \"2e5 N/m^3\" }\n"), "hard");
+  compare(simulated({drag}, samples), integrated([](double, double v, double, double) { return -2 * std::abs(v) * v; }, none, samples));
+  compare(simulated({drag, hard}, samples), integrated([](double x, double v, double, double) { return -2 * std::abs(v) * v - 2e5 * x * x * x; }, none, samples));
+  compare(simulated({file_of("c * t * sin(7 * t) - 0.5 * v", "c = { start = 1 }\n")}, samples), integrated([](double, double v, double t, double) { return t * std::sin(7 * t) - 0.5 * v; }, none, samples));
+  compare(simulated({file_of("-m * a - k * x^3", "m = { start = \"0.7 kg\" }\nk = { start = \"2e5 N/m^3\" }\n")}, samples), integrated([](double x, double, double, double) { return -2e5 * x * x * x; }, none, samples, 0.7));
+  compare(simulated({file_of("-k * x * (1 + z^2)", "k = { start = \"100 N/m\" }\n", "memory = \"20 * v - 3 * z\"\n")}, samples),
+          integrated([](double x, double, double, double z) { return -100 * x * (1 + z * z); }, [](double, double v, double z) { return 20 * v - 3 * z; }, samples));
+}
+
+TEST(LawEffect, WhatTheRigOrTheRunDoesNotHaveIsRefused) {
+  Rig rig;
+  rig.file = "rig.toml";
+  rig.modal = {{1, 5, 0.01, 1, "m"}};
+  add_law(rig, parse_law(file_of("-c * twist", "c = { start = 1 }\n"), "law.toml"));
+  EXPECT_THROW(AeroelasticModel(rig, {}, {}).with_effects({"law:mine"}), InputError);
+  EXPECT_THROW(add_law(rig, parse_law(file_of("-c * x", "c = { start = 1 }\n"), "other.toml")), InputError) << "the same name";
+  const AeroelasticModel model = beam({file_of("c * alpha^3", "c = { start = 1 }\n")});
+  Conditions still;
+  still.density = 998;
+  EXPECT_TRUE(model.system(still, model.start_values(), {"gauge"}).feedback.empty()) << "no angle of attack without a stream";
 }
 
 }  // namespace

@@ -1,14 +1,14 @@
 #!/bin/sh
 # Builds a fuzzer of a reader with clang's libFuzzer, AddressSanitizer and UBSan, and runs it on its corpus. Not part of the tests; README.md has the results.
 #
-#   sh tests/fuzz/fuzz.sh run|rig|tdms|uff|mat|text [SECONDS]
+#   sh tests/fuzz/fuzz.sh run|rig|law|tdms|uff|mat|text [SECONDS]
 #
 # What it finds lies in build/fuzz as crash-*, timeout-* or oom-*.
 set -eu
 cd "$(dirname "$0")/../.."
 target=${1-}
 seconds=${2:-600}
-[ -f "tests/fuzz/fuzz_$target.cpp" ] || { echo "usage: sh tests/fuzz/fuzz.sh run|rig|tdms|uff|mat|text [SECONDS]" >&2; exit 2; }
+[ -f "tests/fuzz/fuzz_$target.cpp" ] || { echo "usage: sh tests/fuzz/fuzz.sh run|rig|law|tdms|uff|mat|text [SECONDS]" >&2; exit 2; }
 mkdir -p "build/fuzz/$target"
 # shellcheck disable=SC2046  # lists of words
 clang++ -std=c++20 -O1 -g -fsanitize=fuzzer,address,undefined -fno-sanitize-recover=undefined -DFMT_SHARED -DTOML_HEADER_ONLY=0 -DTOML_SHARED_LIB=1 \
