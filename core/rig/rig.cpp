@@ -192,7 +192,7 @@ void take_sensor_shape(const TomlTable& table, std::size_t sensors, ModalMode& m
   }
   if (!table.has("sensor_shape"))
     table.fail("sensor_shape", fmt::format("{} is missing", name), fmt::format("wanted {} number{}, one per [[sensor]]: what it moves by per unit of the modal displacement", sensors, sensors > 1 ? "s" : ""));
-  const VectorXd shape = table.numbers("sensor_shape");
+  const Eigen::VectorXd shape = table.numbers("sensor_shape");
   mode.sensor_shape.assign(shape.begin(), shape.end());
   if (mode.sensor_shape.size() != sensors)
     table.fail("sensor_shape", fmt::format("{} has {} numbers", name, mode.sensor_shape.size()), fmt::format("wanted {}, one per [[sensor]] in their order", sensors));
