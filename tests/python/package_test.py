@@ -1,0 +1,79 @@
+"""The Python package against the program: python3 package_test.py UNRIG SAMPLE_CAMPAIGN, with the package on PYTHONPATH. Prints one line; fails by an assertion."""
+import json
+import pathlib
+import subprocess
+import sys
+import tempfile
+
+try:
+    import numpy as np
+    import xarray  # noqa: F401
+except ImportError as missing:
+    print(f"skipped: {missing}")
+    sys.exit(77)
+
+import unrig
+
+program, campaign = sys.argv[1], pathlib.Path(sys.argv[2])
+rig = str(campaign / "rig.toml")
+runs = [str(campaign / name) for name in ("dry_pluck.csv", "wet_pluck.csv", "step_a.csv")]
+
+with tempfile.TemporaryDirectory() as folder:
+    folder = pathlib.Path(folder)
+
+    def command(*words):
+        return subprocess.run([program, *map(str, words)], check=True, capture_output=True, text=True).stdout
+
+    # A fit: every number as in fit.json, to the last bit.
+    report = command("fit", "--rig", rig, *runs, "-o", folder / "fit.json")
+    written = json.loads((folder / "fit.json").read_text())
+    told = []
+    result = unrig.fit(rig, runs, progress=told.append)
+    assert result.data["parameters"] == written["parameters"] and result.data["correlation"] == written["correlation"]
+    assert result.fit_report().splitlines()[-1] == report.splitlines()[-1]
+    assert told and result.success and result.no_answer == ""
+    stiffness = result.params["normal.stiffness_scale"]
+    truth = json.loads((campaign / "KEY.json").read_text())["truth"]["kn"] if (campaign / "KEY.json").exists() else 0.7887
+    assert abs(stiffness.value - truth) < 0.001 and 0 < stiffness.stderr < 1e-4
+    assert result.params["normal_force_slope"] is result.params["normal_force_slope (step_a.csv)"]
+    assert np.allclose(np.sqrt(np.diag(result.covar)), [p.stderr for p in result.params.values()], equal_nan=True)
+    assert "<table>" in result._repr_html_()
+    try:
+        result.params["no_such_parameter"]
+        raise AssertionError("a parameter that is not there")
+    except KeyError as error:
+        assert "normal.stiffness_scale" in str(error)
+
+    # A correction: the numbers of corrected.csv, of a fit handed over as an object and as a file.
+    command("correct", "--rig", rig, "--fit", folder / "fit.json", runs[2], "-o", folder / "corrected.csv")
+    lines = [line for line in (folder / "corrected.csv").read_text().splitlines() if not line.startswith("#")]
+    header = [cell.split(" [")[0] for cell in lines[0].split(",")]
+    rows = np.array([[float(cell) if cell else np.nan for cell in line.split(",")[:9]] for line in lines[1:]])
+    load, same = unrig.correct(rig, result, runs[2]), unrig.correct(rig, str(folder / "fit.json"), runs[2])
+    for name in ("circulatory", "circulatory_std", "normal_force", "normal_force_std"):
+        printed = rows[:, header.index(name)]
+        assert np.allclose(load[name], printed, rtol=1e-5, atol=1e-6), name
+        assert np.array_equal(load[name], same[name]), name
+    assert load.circulatory.attrs["units"] == "N" and load.attrs["run_fingerprint"] == unrig.read_run(runs[2]).fingerprint
+    load.to_netcdf(folder / "load.nc") if hasattr(load, "to_netcdf") else None
+
+    # Arrays: the same readings give the same fit; a column is a view of the run's memory.
+    pluck = unrig.read_run(runs[0])
+    angle = {"alpha": (np.degrees(pluck["alpha"]), "deg")} if "alpha" in pluck.columns else {}
+    array = unrig.run_from_arrays(pluck.time, {"gauge": (pluck["gauge"], "N"), **angle}, kind="pluck", density=pluck.density, medium=pluck.medium, name=runs[0])
+    assert np.array_equal(array["gauge"], pluck["gauge"], equal_nan=True)
+    assert np.shares_memory(pluck["gauge"], pluck["gauge"])
+    again = unrig.fit(rig, [array, *runs[1:]])
+    assert abs(again.params["normal.stiffness_scale"].value - stiffness.value) < 0.1 * stiffness.stderr
+
+    # Errors have the program's messages.
+    for wrong, call in ((unrig.InputError, lambda: unrig.fit(rig, ["no_such_file.csv"])), (ValueError, lambda: unrig.run_from_arrays([0, 1, 3, 4], {"gauge": ([0, 1, 2, 3], "N")}, kind="pluck", density=1.2)),
+                        (unrig.InputError, lambda: unrig.fit(rig, runs, effects=["no-such-effect"]))):
+        try:
+            call()
+        except wrong as error:
+            assert "wanted" in str(error), error
+        else:
+            raise AssertionError(wrong)
+
+print("the Python package agrees with the program")
