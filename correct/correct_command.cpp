@@ -28,6 +28,12 @@ void finish(const Result& result, const std::string& output, const TextFile& fur
   fmt::print("{}", report(result));
 }
 
+/// A rig of which all but the amplifier is what was fitted.
+void warn_of_amplifier(const CorrectProblem& problem, std::vector<std::string>& warnings) {
+  if (const std::string found = other_rig(problem.rig, problem.fit); !found.empty())
+    warnings.push_back(fmt::format("{}: {}. That is right where the fitted recordings came through another amplifier than this one; otherwise fit again.", problem.rig.file, found));
+}
+
 }  // namespace
 
 int correct_command(int argc, char** argv) {
@@ -69,10 +75,13 @@ int correct_command(int argc, char** argv) {
       at.fit.rig_fingerprint.clear();
       warn("the band of the load does not allow for the uncertainties that rig file and run state: it does so for a rig with a section only");
     }
-    finish(modal_load(at), output, {}, made_by, progress);
+    ModalLoad load = modal_load(at);
+    warn_of_amplifier(problem, load.warnings);
+    finish(load, output, {}, made_by, progress);
     return exit_done;
   }
-  const CorrectResult result = correct(problem);
+  CorrectResult result = correct(problem);
+  warn_of_amplifier(problem, result.warnings);
   finish(result, output, {indicial, [&](const TextSink& sink) { sink(to_indicial_csv(result, made_by)); }}, made_by, progress);
   if (result.no_answer.empty()) return exit_done;
   warn("no trustworthy answer: " + result.no_answer);

@@ -331,8 +331,10 @@ const FittedParameter* FittedRig::find(const std::string& name, const std::strin
 }
 
 void refuse_other_rig(const Rig& rig, const FittedRig& fit) {
-  if (const std::string found = other_rig(rig, fit); !found.empty())
-    throw InputError({rig.file, 0}, found, "wanted the rig of the fit: its parameters multiply the numbers of its rig file", "Fit this rig, or give the rig file as it was.");
+  std::vector<std::string> parts = fit.rig_differs_in(rig);
+  std::erase(parts, "gauge");  // another amplifier: the structure that was fitted is the same
+  if (!parts.empty())
+    throw InputError({rig.file, 0}, other_rig(rig, fit), "wanted the rig of the fit: its parameters multiply the numbers of its rig file", "Fit this rig, or give the rig file as it was.");
 }
 
 void check_is_fit_of(const AeroelasticModel& model, const FittedRig& fit, const std::string& run_file) {

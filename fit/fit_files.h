@@ -55,8 +55,8 @@ std::string other_rig(const Rig& rig, const FittedRig& fit);
 /// Throws InputError where it has.
 void refuse_other_rig(const Rig& rig, const FittedRig& fit);
 
-/// Throws InputError where the fit says that its rig had other numbers: its parameters are multiples of them, and an answer would be wrong by as much as nobody knows. And where a parameter of the rig is none
-/// of the fit.
+/// Throws InputError where the fit says that its rig had other numbers: its parameters are multiples of them, and an answer would be wrong by as much as nobody knows. Amplifiers in the gauge's channel
+/// may be others, as recordings may have been made with others. And where a parameter of the rig is none of the fit.
 void check_is_fit_of(const AeroelasticModel& model, const FittedRig& fit, const std::string& run_file);
 
 /// theta of `model` for a run: the fit's values, and the model's start values for what the fit does not name. For a run that was not fitted the slope of the normal force is that of the

@@ -98,6 +98,13 @@ TEST_F(ProvenanceOf, AFitOfAnotherRigIsNotUsed) {
   EXPECT_EQ(simulated.status, 0) << "what would be is a fair question; " << simulated.err;
   EXPECT_THAT(simulated.err, AllOf(HasSubstr(wider), HasSubstr("[section]"), HasSubstr(fit_)));
 
+  // The recordings may have come through different amplifiers.
+  const std::string amplifier = directory_.file("amplifier.toml", replaced(rig, "[gauge]", "[gauge]\nlowpass = { order = 1, cutoff = \"200 Hz\" }"));
+  const Finished amplified = correct(amplifier, fit_);
+  EXPECT_NE(amplified.status, 2) << amplified.err;
+  EXPECT_THAT(amplified.err, HasSubstr("warning: " + amplifier + ": other numbers in [gauge] than the rig " + rig_ + " that " + fit_ + " was fitted to"));
+  EXPECT_THAT(read_text(directory_.path("corrected.csv")), HasSubstr("other numbers in (gauge)")) << "in the table too";
+
   // Other words and units are the same rig.
   const std::string renamed = directory_.file("renamed.toml", "# a remark\n" + rig);
   const Finished same = correct(renamed, fit_);

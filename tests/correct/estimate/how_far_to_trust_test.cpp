@@ -46,6 +46,20 @@ TEST(HowFarToTrust, TravelsWithBothTables) {
   }
 }
 
+TEST(HowFarToTrust, WhatMadeThemIsTheLastColumnOfBothTables) {
+  const MadeBy made{{"unrig 0.1.0", "unrig correct 'run #3, [a].csv'"}, "1a", "2b", "3c"};
+  const CorrectResult r = made_up_result(1.02, {"run #3.csv: a warning"});
+  for (const std::string& text : {to_csv(r, made), to_indicial_csv(r, made)}) {
+    EXPECT_EQ(text.find('#'), std::string::npos) << "readers that skip comments would cut the header off there";
+    const CsvTable table = read_csv(text, 1, "table.csv");
+    EXPECT_EQ(table.columns.back().value, VectorXd::Ones(rows));
+    const HowFarToTrust trust = HowFarToTrust::of_table(table);
+    EXPECT_EQ(trust.made_by.provenance.program, "unrig 0.1.0");
+    EXPECT_EQ(trust.made_by.provenance.command, "unrig correct 'run ?3; (a).csv'");
+    EXPECT_EQ(trust.made_by.rig + trust.made_by.run + trust.made_by.fit, "1a2b3c");
+  }
+}
+
 TEST(HowFarToTrust, LeavesATableOfNumbersWhereNothingIsToBeWarnedOf) {
   const CorrectResult r = made_up_result(1.02, {});
   for (const std::string& text : {to_csv(r), to_indicial_csv(r)}) {
