@@ -117,7 +117,7 @@ void add_forces(ReportPage& page, const json& forces) {
   std::vector<std::vector<std::string>> rows;
   for (const json& f : forces)
     rows.push_back({file_name(text_of(f, "run")), with_error(number_of(f, "rms"), number_of(f, "standard_deviation")), plain(number_of(f, "reading_as_force"), 4), text_of(f, "unit"),
-                    f.value("out_of_proportion", false) ? "out of proportion: the rig hardly answers a force there; what is missing is no force" : ""});
+                    f.value("out_of_proportion", false) ? "out of proportion: no load. Where the rig hardly answers a force, noise and errors of the description read as a large one" : ""});
   if (!rows.empty()) page.add_table("The force that would explain what is left", {"run", "force (r.m.s.) ± its error", "all that the gauge reads, as a steady force", "unit", "remark"}, rows);
 }
 

@@ -200,7 +200,7 @@ std::string report(const Diagnosis& d) {
   for (const MissingForce& f : d.missing_force) {
     text += fmt::format("    what is left of {} would be explained by a force of {:.3g} N r.m.s. at the calibration element, known to {:.2g} N (diagnosis file: missing_force)\n", base_name(f.run), f.rms(), f.standard_deviation);
     if (f.out_of_proportion())
-      text += fmt::format("        out of proportion: all that the gauge reads there is {:.3g} N r.m.s. The rig hardly answers a force at these frequencies: what is missing is no force, but in the signal or in the rig's description\n", f.as_read);
+      text += fmt::format("        out of proportion: all that the gauge reads there is {:.3g} N r.m.s. Do not take it for a load: where the rig hardly answers a force, noise, errors of the signal and of the rig's description all read as a large one\n", f.as_read);
   }
   text += "[[Improvement]] r.m.s. of the residual: the rig alone -> with what was found (of runs that were not fitted: predicted, from a fit of the rig alone with less weight for runs that it cannot explain)\n";
   for (const ImprovedRun& r : d.runs)

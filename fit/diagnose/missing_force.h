@@ -18,7 +18,7 @@ struct MissingForce {
   double as_read = 0;         ///< N, r.m.s.: the whole recording, its mean removed, read as a steady force; 0 where none is read at all
 
   double rms() const { return std::sqrt(value.squaredNorm() / static_cast<double>(value.size())); }
-  /// Larger than all that the gauge read: what is missing sits at frequencies at which the rig hardly answers a force, or answers one out of phase, and is none.
+  /// Larger than all that the gauge read: at frequencies at which the rig hardly answers a force, noise and errors of the signal and of the rig's description read as a large one.
   bool out_of_proportion() const { return as_read > 0 && rms() > as_read; }
 };
 
