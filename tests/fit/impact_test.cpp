@@ -58,7 +58,7 @@ TEST(ImpactTest, FindsTheBalanceFromItsOwnFile) {
   }
 }
 
-/// Errors are as large as they say. The long form, 240 draws (seeds 1 to 240), is in the comment below the test.
+/// Eight draws only: a short form, that notices errors wrong by a factor of two.
 TEST(ImpactTest, ErrorsAreAsLargeAsTheySay) {
   const Rig truth = balance();
   double squares = 0, count = 0, chi2 = 0;
