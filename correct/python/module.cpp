@@ -92,16 +92,23 @@ Run run_of_arrays(const std::string& name, const std::string& kind, const Eigen:
   return run;
 }
 
-FitResult fit_of(const Rig& rig, const std::vector<Run>& runs, const std::vector<std::string>& effects, const StartValues& start, const std::vector<std::string>& profile, const py::object& progress) {
+/// A fit, and the laws of its rig, which its file carries.
+struct FitWithLaws : FitResult {
+  std::vector<std::shared_ptr<const Effect>> laws;
+};
+
+FitWithLaws fit_of(const Rig& rig, const std::vector<Run>& runs, const std::vector<std::string>& effects, const std::vector<std::string>& laws, const StartValues& start, const std::vector<std::string>& profile, const py::object& progress) {
   FitProblem problem;
   problem.rig = rig;
   problem.runs = runs;
   problem.effects = effects_of_option("effects", effects);
+  const std::vector<std::string> ids = add_laws(problem.rig, laws);
+  problem.effects.insert(problem.effects.end(), ids.begin(), ids.end());
   problem.start = start;
   problem.profile = profile;
   problem.progress = told(progress);
   const py::gil_scoped_release unlocked;
-  return fit(problem);
+  return {fit(problem), problem.rig.laws};
 }
 
 py::dict load_of(const CorrectedLoad& load) {
@@ -179,11 +186,11 @@ PYBIND11_MODULE(_unrig, m) {
   m.def("read_run", &read_run, "path"_a);
   m.def("run_of_arrays", &run_of_arrays, "name"_a, "kind"_a, "time"_a, "columns"_a, "density"_a, "speed"_a, "medium"_a);
 
-  py::class_<FitResult>(m, "Fit")
-      .def_readonly("no_answer", &FitResult::no_answer)
-      .def_property_readonly("json", [](const FitResult& r) { return to_json(r); })
-      .def("report", [](const FitResult& r, double least) { return report(r, least); }, "least"_a = 0.1);
-  m.def("fit", &fit_of, "rig"_a, "runs"_a, "effects"_a, "start"_a, "profile"_a, "progress"_a);
+  py::class_<FitWithLaws>(m, "Fit")
+      .def_readonly("no_answer", &FitWithLaws::no_answer)
+      .def_property_readonly("json", [](const FitWithLaws& r) { return to_json(r, r.laws); })
+      .def("report", [](const FitWithLaws& r, double least) { return report(r, least); }, "least"_a = 0.1);
+  m.def("fit", &fit_of, "rig"_a, "runs"_a, "effects"_a, "laws"_a, "start"_a, "profile"_a, "progress"_a);
   m.def("correct", &correction, "rig"_a, "fit_json"_a, "fit_name"_a, "run"_a, "calibration"_a, "monotone"_a, "at_step"_a);
 
   m.def("apparent_mass", [](const Rig& rig, const Run& dry, const Run& wet, const py::object& progress) {

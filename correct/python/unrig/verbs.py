@@ -19,12 +19,10 @@ def fit(rig: Union[Path, Rig], runs: Iterable[Union[Path, Run]], effects: Sequen
         progress: Progress = None) -> FitResult:
     """Stiffness, damping, apparent mass and lift slope from all runs together, as `unrig fit`.
 
-    effects: ids of physics beyond the rig model that is at work. start: start values in SI by parameter name.
+    effects: ids of physics beyond the rig model that is at work. laws: files with laws of your own. start: start values in SI by parameter name.
     profile: parameters to give profile-likelihood intervals of, or ["all"]. progress: called with what is being done.
     """
-    if laws:
-        raise _unrig.InputError("laws: not yet known to the Python package; wanted none")
-    return FitResult(_unrig.fit(as_rig(rig), [as_run(run) for run in runs], list(effects), dict(start), list(profile), progress))
+    return FitResult(_unrig.fit(as_rig(rig), [as_run(run) for run in runs], list(effects), [str(law) for law in laws], dict(start), list(profile), progress))
 
 
 def correct(rig: Union[Path, Rig], result: Union[Path, FitResult], run: Union[Path, Run], *, calibration_error: float = 0.0, monotone: bool = False, at_step: Optional[float] = None):
