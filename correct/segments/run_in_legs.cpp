@@ -37,7 +37,8 @@ VectorXd steady_reading(const LinearSystem& system) {
   VectorXd state = VectorXd::Zero(system.states());
   state[system.motion] = 1;
   const MatrixXd own = system.A.value(moved, moved);
-  const VectorXd by_angle = system.A.value(moved, system.motion);
+  VectorXd by_angle(static_cast<Index>(moved.size()));
+  for (Index i = 0; i < by_angle.size(); ++i) by_angle[i] = system.A.value(moved[static_cast<std::size_t>(i)], system.motion);
   state(moved) = own.partialPivLu().solve(-by_angle).eval();
   return system.C.value * state;
 }

@@ -226,7 +226,7 @@ Diagnosis diagnose_in_order(const DiagnoseProblem& problem) {
 
   if (d.unexplained)
     for (const Candidate& c : d.ranking)
-      if (c.search == Search::failed) d.not_followed.push_back(c.effects);
+      if (c.search == SearchOutcome::failed) d.not_followed.push_back(c.effects);
 
   if (!problem.verdict_only) {
     tell("describing the result");
@@ -234,7 +234,7 @@ Diagnosis diagnose_in_order(const DiagnoseProblem& problem) {
     for (const ImprovedRun& run : unseen) d.runs.push_back(run);
     if (d.unexplained) d.missing_force = missing_forces(best.arrival.joint);
   }
-  if (!d.not_followed.empty()) d.search = Search::failed;
+  if (!d.not_followed.empty()) d.search = SearchOutcome::failed;
   if (!best.effects.empty()) {
     d.naming = naming_of(best, baseline, clean, predicts);
     if (d.naming == Naming::named) name_equivalent(baseline, best, selection.tried(), problem.verdict_only, d);

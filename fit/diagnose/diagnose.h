@@ -33,7 +33,7 @@ struct DiagnoseProblem {
 
 /// How the search for the best fit with a set of effects ended. A set with one effect more can do all that the set without it does. Where it leaves a decisively lower likelihood all the same
 /// (-2 ln L higher by more than 10), the search has failed, and what the set would explain is not known. `ruled_out`: free decays speak against it, so that the other runs were not searched.
-enum class Search { complete, ruled_out, failed };
+enum class SearchOutcome { complete, ruled_out, failed };
 
 /// A set of effects that was tried.
 struct Candidate {
@@ -42,7 +42,7 @@ struct Candidate {
   double delta_bic = 0;      ///< against the fit with nothing missing; negative is better
   double probability = 0;    ///< exp(-BIC/2) over the sum of it over all sets tried
   double score = 0;          ///< share of the excess of chi-square that one linear step promised to remove (first round only)
-  Search search = Search::complete;
+  SearchOutcome search = SearchOutcome::complete;
 };
 
 struct MissingEffect {
@@ -68,7 +68,7 @@ struct Diagnosis {
   std::vector<std::vector<std::string>> equivalent;  ///< sets that these runs cannot tell from the winner
   std::vector<std::optional<SeparatingRecording>> separated_by;  ///< and the recording that would, for each of them
   bool unexplained = false;            ///< a significant mismatch remains
-  Search search = Search::complete;    ///< of all; failed: something is unexplained, and it may be because of what was not followed
+  SearchOutcome search = SearchOutcome::complete;    ///< of all; failed: something is unexplained, and it may be because of what was not followed
   std::vector<std::vector<std::string>> not_followed;  ///< then: the sets whose own search failed; an empty set: the rig with nothing added
   std::vector<MissingEffect> closest;  ///< where nothing is named: the best set that was tried
   double removed_by_closest = 0;       ///< share of the excess

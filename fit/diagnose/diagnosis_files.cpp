@@ -66,28 +66,28 @@ std::string why_not_named(Naming naming) {
   return "";
 }
 
-const char* name_of(Search search) {
+const char* name_of(SearchOutcome search) {
   switch (search) {
-    case Search::complete: return "complete";
-    case Search::ruled_out: return "ruled out";
-    case Search::failed: break;
+    case SearchOutcome::complete: return "complete";
+    case SearchOutcome::ruled_out: return "ruled out";
+    case SearchOutcome::failed: break;
   }
   return "failed";
 }
 
 /// Behind a set in the list of those tried.
-const char* in_words(Search search) {
+const char* in_words(SearchOutcome search) {
   switch (search) {
-    case Search::complete: return "";
-    case Search::ruled_out: return "  ruled out by the free decays, not fitted to the other runs";
-    case Search::failed: break;
+    case SearchOutcome::complete: return "";
+    case SearchOutcome::ruled_out: return "  ruled out by the free decays, not fitted to the other runs";
+    case SearchOutcome::failed: break;
   }
   return "  the search lost its way: no verdict on this set";
 }
 
 /// What a search that failed could not follow, and what that means for the verdict; empty where none did.
 std::string search_words(const Diagnosis& d) {
-  if (d.search != Search::failed) return "";
+  if (d.search != SearchOutcome::failed) return "";
   std::vector<std::string> sets;
   for (const std::vector<std::string>& set : d.not_followed)
     if (!set.empty()) sets.push_back(set_name(set));
@@ -100,7 +100,7 @@ std::string search_words(const Diagnosis& d) {
 std::string verdict(const Diagnosis& d) {
   if (!d.mismatch.found) return "Nothing is missing: " + d.mismatch.summary + ".";
   if (d.missing.empty())
-    return d.search == Search::failed ? "There is a mismatch, and the search for what removes it failed in part: unexplained." : "There is a mismatch that no known effect removes: unexplained.";
+    return d.search == SearchOutcome::failed ? "There is a mismatch, and the search for what removes it failed in part: unexplained." : "There is a mismatch that no known effect removes: unexplained.";
   std::vector<std::string> ids;
   for (const MissingEffect& m : d.missing) ids.push_back(m.effect);
   return fmt::format("Missing is {}{}.", fmt::join(ids, " and "), d.unexplained ? "; something remains unexplained" : "");

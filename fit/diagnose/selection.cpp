@@ -97,9 +97,9 @@ Trial in_finer_steps(Trial trial) {
 
 }  // namespace
 
-Search search_of(const Trial& trial, const Trial& base) {
-  if (trial.ruled_out) return Search::ruled_out;
-  return !effect(trial.effects.back()).parameters.empty() && deviance_difference(trial, base) > decisive ? Search::failed : Search::complete;
+SearchOutcome search_of(const Trial& trial, const Trial& base) {
+  if (trial.ruled_out) return SearchOutcome::ruled_out;
+  return !effect(trial.effects.back()).parameters.empty() && deviance_difference(trial, base) > decisive ? SearchOutcome::failed : SearchOutcome::complete;
 }
 
 Mismatch what_remains(const Trial& trial) {

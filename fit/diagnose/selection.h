@@ -13,7 +13,7 @@ constexpr double decisive = 10;  ///< BIC: very strong evidence (Kass and Rafter
 Mismatch what_remains(const Trial& trial);
 
 /// How the search ended for a set with one effect more than `base`. An effect without parameters (all the modes of the rig) cannot be taken to nothing: it may leave more.
-Search search_of(const Trial& trial, const Trial& base);
+SearchOutcome search_of(const Trial& trial, const Trial& base);
 
 /// Which set of effects explains what a baseline leaves. The set grows by one effect at a time, the best of all that are worth a fit; what others made superfluous
 /// is taken away again, and while a mismatch remains signals among the earlier members are exchanged for what explains more beside the others. No set has more than three.

@@ -39,16 +39,16 @@ Trial two_runs() {
 
 TEST(SearchFailed, OneEffectMoreCannotLeaveMore) {
   const Trial any = two_runs(), base = leaving(any, {}, 7.8e4);
-  EXPECT_EQ(search_of(leaving(any, {"cubic-stiffness"}, 7e18), base), Search::failed);
-  EXPECT_EQ(search_of(leaving(any, {"cubic-stiffness"}, 7.7e4), base), Search::complete);
-  EXPECT_EQ(search_of(leaving(any, {"cubic-stiffness"}, 7.8e4), base), Search::complete) << "an effect of no size";
+  EXPECT_EQ(search_of(leaving(any, {"cubic-stiffness"}, 7e18), base), SearchOutcome::failed);
+  EXPECT_EQ(search_of(leaving(any, {"cubic-stiffness"}, 7.7e4), base), SearchOutcome::complete);
+  EXPECT_EQ(search_of(leaving(any, {"cubic-stiffness"}, 7.8e4), base), SearchOutcome::complete) << "an effect of no size";
   // -2 ln L = 2000 ln of the ratio: 10 of it is half a per cent of the power.
-  EXPECT_EQ(search_of(leaving(any, {"cubic-stiffness"}, 7.8e4 * 1.004), base), Search::complete);
-  EXPECT_EQ(search_of(leaving(any, {"cubic-stiffness"}, 7.8e4 * 1.006), base), Search::failed);
-  EXPECT_EQ(search_of(leaving(any, {"higher-mode"}, 7e18), base), Search::complete) << "all the modes are no more than some of them and a number";
+  EXPECT_EQ(search_of(leaving(any, {"cubic-stiffness"}, 7.8e4 * 1.004), base), SearchOutcome::complete);
+  EXPECT_EQ(search_of(leaving(any, {"cubic-stiffness"}, 7.8e4 * 1.006), base), SearchOutcome::failed);
+  EXPECT_EQ(search_of(leaving(any, {"higher-mode"}, 7e18), base), SearchOutcome::complete) << "all the modes are no more than some of them and a number";
   Trial told = leaving(any, {"freeplay"}, 7e18);
   told.ruled_out = true;
-  EXPECT_EQ(search_of(told, base), Search::ruled_out);
+  EXPECT_EQ(search_of(told, base), SearchOutcome::ruled_out);
 }
 
 TEST(SearchFailed, BicIsTheLikelihoodAndWhatVariablesCost) {
@@ -57,17 +57,17 @@ TEST(SearchFailed, BicIsTheLikelihoodAndWhatVariablesCost) {
   EXPECT_NEAR(bic_difference(other, base), 2000 * std::log(2.0 / 3) + std::log(2000.0), 1e-9);
 }
 
-Diagnosis unexplained(Search search, std::vector<std::vector<std::string>> not_followed) {
+Diagnosis unexplained(SearchOutcome search, std::vector<std::vector<std::string>> not_followed) {
   Diagnosis d;
   d.mismatch.found = d.unexplained = true;
   d.search = search;
   d.not_followed = std::move(not_followed);
-  d.ranking = {{{}, 7.8e4, 0, 1, 0, Search::complete}, {{"freeplay"}, 7e18, 1e5, 0, 0, search}};
+  d.ranking = {{{}, 7.8e4, 0, 1, 0, SearchOutcome::complete}, {{"freeplay"}, 7e18, 1e5, 0, 0, search}};
   return d;
 }
 
 TEST(SearchFailed, TheDiagnosisSaysWhatFailed) {
-  const Diagnosis thorough = unexplained(Search::complete, {}), lost = unexplained(Search::failed, {{}, {"freeplay"}, {"tank-wave", "freeplay"}});
+  const Diagnosis thorough = unexplained(SearchOutcome::complete, {}), lost = unexplained(SearchOutcome::failed, {{}, {"freeplay"}, {"tank-wave", "freeplay"}});
   const json complete = json::parse(to_json(thorough)), failed = json::parse(to_json(lost));
   EXPECT_EQ(complete["search"], "complete");
   EXPECT_EQ(complete["search_summary"], "");
