@@ -83,11 +83,11 @@ struct ModeColumns {
 };
 
 /// Frequency and damping ratio of one mode, and how it is seen.
-struct Trial {
+struct Attempt {
   double frequency = 0, damping_ratio = 0;
 };
 
-ModeColumns columns_of(const Trial& trial, const RunResidual& run, const Part& part, std::size_t mode) {
+ModeColumns columns_of(const Attempt& trial, const RunResidual& run, const Part& part, std::size_t mode) {
   const double omega = 2 * pi * trial.frequency;
   const ModalMode& shape = run.model().rig().modal[mode];
   const auto& sensors = run.model().rig().sensors;
@@ -133,7 +133,7 @@ class ModalLeastSquares {
     for (const Part& part : parts_) forced_ |= part.force.size() > 0, moved_ |= part.acceleration.size() > 0;
   }
 
-  Fitted fit(const std::vector<Trial>& trials) const {
+  Fitted fit(const std::vector<Attempt>& trials) const {
     const auto modes = static_cast<Index>(trials.size()), shared = (forced_ ? modes : 0) + (moved_ ? modes : 0);
     std::vector<MatrixXd> rows;
     for (std::size_t r = 0; r < parts_.size(); ++r) rows.push_back(rows_of(r, trials, shared));
@@ -150,7 +150,7 @@ class ModalLeastSquares {
 
  private:
   /// [what all runs share | reading], without what the run's own initial state and offsets can take.
-  MatrixXd rows_of(std::size_t r, const std::vector<Trial>& trials, Index shared) const {
+  MatrixXd rows_of(std::size_t r, const std::vector<Attempt>& trials, Index shared) const {
     const Part& part = parts_[r];
     const auto modes = static_cast<Index>(trials.size());
     const Index n = part.reading.rows(), channels = part.reading.cols(), own = 2 * modes + channels;
@@ -174,7 +174,7 @@ class ModalLeastSquares {
   bool forced_ = false, moved_ = false;
 };
 
-bool ascending_like(const std::vector<Trial>& trials, const std::vector<ModalMode>& file) {
+bool ascending_like(const std::vector<Attempt>& trials, const std::vector<ModalMode>& file) {
   for (std::size_t a = 0; a < trials.size(); ++a)
     for (std::size_t b = 0; b < trials.size(); ++b)
       if (file[a].frequency < file[b].frequency && !(trials[a].frequency < trials[b].frequency)) return false;
@@ -215,7 +215,7 @@ bool start_modes_from_spectra(JointProblem& joint) {
     const std::vector<double> of_run = resonances(run);
     lines.insert(lines.end(), of_run.begin(), of_run.begin() + static_cast<std::ptrdiff_t>(std::min(of_run.size(), some)));
   }
-  std::vector<Trial> best(file.size());
+  std::vector<Attempt> best(file.size());
   for (std::size_t i = 0; i < file.size(); ++i) {
     const ModalPlace p = place_of_mode(model, i);
     best[i] = {modal_frequency(model, theta, i), theta[p.damping] / (2 * std::sqrt(theta[p.mass] * theta[p.stiffness]))};
@@ -223,8 +223,8 @@ bool start_modes_from_spectra(JointProblem& joint) {
   const ModalLeastSquares modes(joint);
   double least = modes.fit(best).left;
   const double before = least;
-  const auto consider = [&](std::size_t i, const Trial& trial) {
-    std::vector<Trial> other = best;
+  const auto consider = [&](std::size_t i, const Attempt& trial) {
+    std::vector<Attempt> other = best;
     other[i] = trial;
     if (!ascending_like(other, file)) return false;
     const double left = modes.fit(other).left;
