@@ -36,10 +36,16 @@ VectorXd steady_reading(const LinearSystem& system) {
     if ((i < system.motion || i > system.motion + 2) && std::find(system.exogenous.begin(), system.exogenous.end(), i) == system.exogenous.end()) moved.push_back(i);
   VectorXd state = VectorXd::Zero(system.states());
   state[system.motion] = 1;
-  const MatrixXd own = system.A.value(moved, moved);
-  VectorXd by_angle(static_cast<Index>(moved.size()));
-  for (Index i = 0; i < by_angle.size(); ++i) by_angle[i] = system.A.value(moved[static_cast<std::size_t>(i)], system.motion);
-  state(moved) = own.partialPivLu().solve(-by_angle).eval();
+  const auto count = static_cast<Index>(moved.size());
+  const auto place = [&](Index i) { return moved[static_cast<std::size_t>(i)]; };  // indexed views of Eigen make GCC 12 warn of a deallocation that is none
+  MatrixXd own(count, count);
+  VectorXd by_angle(count);
+  for (Index i = 0; i < count; ++i) {
+    by_angle[i] = system.A.value(place(i), system.motion);
+    for (Index j = 0; j < count; ++j) own(i, j) = system.A.value(place(i), place(j));
+  }
+  const VectorXd rest = own.partialPivLu().solve(-by_angle);
+  for (Index i = 0; i < count; ++i) state[place(i)] = rest[i];
   return system.C.value * state;
 }
 
