@@ -65,13 +65,13 @@ void expect_slopes(const std::string& name, const std::string& head) {
   const std::vector<MotionBasis::Window> windows = motion_windows(run);
   const RunResidual noisy(*model, run, windows);
   const RunResidual::Prediction p = noisy.predict(theta);
-  for (Channel& channel : run.channels)
+  for (Channel& channel : run.channels) {
     if (channel.name == "gauge") channel.value = p.output.col(0);
+    if (channel.name == "alpha" && !windows.empty()) channel.value = p.motion.angle.array() + p.angle_offset[0];
+  }
   const StatedNumbers numbers(problem.rig, problem.runs);
   const Index count = numbers.deviations();
-  RunResidual clean(*model, run, windows);
-  clean.keep_noise_of(noisy);
-  Arrival at{model, {windows}, JointProblem(*model, {clean})};
+  Arrival at{model, {windows}, JointProblem(*model, {RunResidual(*model, run, windows)})};
   const RunResidual& here = at.joint.runs().front();
   const NumberSlopes slopes = number_slopes(at, numbers, VectorXd::Zero(count));
   const auto left = [&](const VectorXd& z) -> VectorXd {
@@ -80,15 +80,15 @@ void expect_slopes(const std::string& name, const std::string& head) {
     const AeroelasticModel there(rig, make_basis(rig, model->basis().normal_modes, model->basis().torsion_modes), model->circulation());
     RunResidual other(there, moved, windows);
     other.keep_noise_of(here);
-    return here.channel_weight(0).cwiseProduct(run.channel("gauge").value - other.predict(theta).output.col(0));
+    return here.channel_weight(0).cwiseProduct(run.channel("gauge").value - other.predict(theta).output.col(0)) / here.channel_weight(0).norm();
   };
   const VectorXd at_zero = left(VectorXd::Zero(count));
   for (Index k = 0; k < count; ++k) {
-    const VectorXd slope = -slopes.runs.front().channels.front().slope.col(theta.size() + k), direction = VectorXd::Unit(count, k);
+    const VectorXd slope = -slopes.runs.front().channels.front().slope.col(theta.size() + k) / here.channel_weight(0).norm(), direction = VectorXd::Unit(count, k);
     const auto miss = [&](double h) { return (left(h * direction) - at_zero - h * slope).norm(); };
     constexpr double h = 0.02;
     const double first = miss(h), second = miss(h / 2);
-    EXPECT_TRUE(std::log2(first / second) > 1.8 || first < 1e-3 * h * slope.norm() || first < 1e-4) << name << ", " << numbers.groups()[static_cast<std::size_t>(k)] << " " << k << ": " << first << ", then " << second << " of " << h * slope.norm();
+    EXPECT_TRUE(std::log2(first / second) > 1.8 || first < 1e-3 * h * slope.norm() || first < 1e-9) << name << ", " << numbers.groups()[static_cast<std::size_t>(k)] << " " << k << ": " << first << ", then " << second << " of " << h * slope.norm();
   }
 }
 
@@ -115,19 +115,29 @@ TEST(InexactRig, NumbersKnownToAMillionthLeaveTheFitAsItIs) {
 /// and the parameters go with it in a straight line.
 struct Parabola {
   FitResult less, here, more;
-  double curvature() const { return (more.chi2 + less.chi2 - 2 * here.chi2) / 2; }
+  double reading = 0;  ///< by so much the gauge's readings, and so their noise, are larger in `more`
+  /// At the noise levels of the fit in the middle: each fit estimates its own.
+  double chi2(const FitResult& fit) const {
+    const double larger = &fit == &more ? 1 + reading : &fit == &less ? 1 - reading : 1;
+    double sum = 0;
+    for (std::size_t r = 0; r < fit.runs.size(); ++r)
+      for (std::size_t c = 0; c < fit.runs[r].channels.size(); ++c)
+        sum += static_cast<double>(fit.runs[r].channels[c].samples) * std::pow(fit.runs[r].channels[c].rms_residual / here.runs[r].channels[c].noise / (c == 0 ? larger : 1), 2);
+    return sum;
+  }
+  double curvature() const { return (chi2(more) + chi2(less) - 2 * chi2(here)) / 2; }
   double left() const { return 1 / std::sqrt(1 + curvature()); }                              ///< of the standard deviation
-  double shift() const { return -(more.chi2 - less.chi2) / 4 / (1 + curvature()); }           ///< standard deviations
+  double shift() const { return -(chi2(more) - chi2(less)) / 4 / (1 + curvature()); }           ///< standard deviations
   double slope(const std::string& name, const std::string& run) const { return (parameter(more, name, run).value - parameter(less, name, run).value) / 2; }
   double error(const std::string& name, const std::string& run) const { return std::hypot(parameter(here, name, run).std_error, slope(name, run) * left()); }
 };
 
-Parabola parabola(const std::function<FitProblem(double)>& off) { return {fit(off(-1)), fit(off(0)), fit(off(1))}; }
+Parabola parabola(const std::function<FitProblem(double)>& off) { return {fit(off(-1)), fit(off(0)), fit(off(1)), 0}; }
 
 void expect_agreement(const FitResult& stated, const Parabola& exact, const std::vector<std::pair<std::string, std::string>>& parameters) {
   const FittedGiven& g = stated.givens.front();
   EXPECT_NEAR(g.std_error / g.stated_std / exact.left(), 1, 0.1);
-  EXPECT_NEAR((g.value - g.stated) / g.stated_std, exact.shift(), 0.1 + exact.left()) << "standard deviations as stated; noise levels are estimated anew in each fit";
+  EXPECT_NEAR((g.value - g.stated) / g.stated_std, exact.shift(), 0.2 * exact.left());
   for (const auto& [name, run] : parameters) EXPECT_NEAR(parameter(stated, name, run).std_error / exact.error(name, run), 1, 0.1) << name;
 }
 
@@ -184,7 +194,7 @@ TEST(InexactRig, ErrorsCoverMassesThatAreOffByWhatIsStated) {
 TEST(InexactRig, CalibrationAndSpeedAreAsFitsOfChangedRunsSay) {
   for (const std::string what : {"calibration", "speed"}) {
     SCOPED_TRACE(what);
-    const Parabola exact = parabola([&](double z) {
+    Parabola exact = parabola([&](double z) {
       FitProblem problem = null_problem(five_runs);
       for (unrig::Run& run : problem.runs) {
         if (what == "speed") run.speed *= 1 + 0.01 * z;
@@ -194,6 +204,7 @@ TEST(InexactRig, CalibrationAndSpeedAreAsFitsOfChangedRunsSay) {
       }
       return problem;
     });
+    if (what == "calibration") exact.reading = 0.01;
     FitProblem problem = null_problem(five_runs);
     for (std::size_t r = 0; r < problem.runs.size(); ++r)
       if (what == "calibration") problem.runs[r].givens = one_per_cent_of_the_calibration();
