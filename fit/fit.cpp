@@ -160,10 +160,13 @@ FitResult fit_in_order(const FitProblem& problem) {
   refuse_idle("--effect", problem.effects, problem.rig, problem.runs);
   const auto model = std::make_shared<const AeroelasticModel>(model_of(problem.rig, problem.runs, problem.circulation, problem.effects));
   check_names(*model, problem);
-  Arrival arrival = problem.effects.empty() ? arrive(problem, model) : arrive_at_effects(problem);
-  check_lengths(arrival.joint);
   std::optional<InexactRig> inexact;
-  if (states_errors(problem.rig, problem.runs)) inexact.emplace(problem).search(arrival);
+  if (states_errors(problem.rig, problem.runs)) inexact.emplace(problem);
+  ArrivalEffort effort;
+  effort.other_starts = !inexact;  // what the rig file's numbers leave unexplained is not for other stiffnesses to explain
+  Arrival arrival = problem.effects.empty() ? arrive(problem, model, effort) : arrive_at_effects(problem);
+  check_lengths(arrival.joint);
+  if (inexact) inexact->search(arrival);
   FitResult result = describe_fit(arrival, problem, Settle::steps, inexact ? &*inexact : nullptr);
   result.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
   return result;

@@ -6,8 +6,9 @@
 #include <memory>
 #include <utility>
 
-#include "core/rig/gauge_lever.h"
+#include "core/effects/effect.h"
 #include "core/numerics/in_parallel.h"
+#include "core/rig/gauge_lever.h"
 #include "fit/fit_description.h"
 
 namespace unrig {
@@ -17,66 +18,172 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-/// The same rig with a gauge that reads so many times as much.
-void amplify(Rig& rig, double gain) {
-  for (ModalMode& mode : rig.modal) mode.gauge_gain *= gain;
-  if (rig.is_modal()) return;
-  GaugeFilter amplifier{DualMatrix(MatrixXd(0, 0)), DualMatrix(MatrixXd(0, 1)), Eigen::RowVectorXd(0), gain};
-  rig.gauge_filters.push_back(std::move(amplifier));
-}
-
-/// A run at other numbers: all weighted residuals, channel by channel, and its first offset in units of the load that it is converted to.
-struct Moved {
-  MatrixXd residual;  ///< samples x channels, the angle last
-  double offset = 0;
+/// The change of a run's linear system per unit of one deviation: matrices over all ports, before what lies behind the bridge.
+struct SystemSlope {
+  MatrixXd A, B, C, D;
+  double unit = 0;   ///< of the logarithm of what a steady load reads
+  double gauge = 0;  ///< and of the gauge's calibration
 };
 
-VectorXd weighted(const VectorXd& weight, const VectorXd& measured, const VectorXd& predicted) {
-  VectorXd left(weight.size());
-  for (Index k = 0; k < left.size(); ++k) left[k] = weight[k] > 0 && std::isfinite(measured[k]) ? weight[k] * (measured[k] - predicted[k]) : 0;
-  return left;
+/// The relative error of a number of a run's head per deviation; 0 where the head does not state it.
+double relative(const Run& run, const VectorXd& off, GivenNumber number) {
+  for (std::size_t i = 0; run.givens && i < run.givens->numbers.size(); ++i)
+    if (run.givens->numbers[i].number == number) return off[static_cast<Index>(i)] / run.givens->numbers[i].value;
+  return 0;
 }
 
-Moved look_at(const RunResidual& run, const VectorXd& theta, double gauge_factor) {
-  const RunResidual::Prediction p = run.predict(theta);
-  const bool with_angle = p.angle_offset.size() > 0;
-  const auto channels = static_cast<Index>(p.channels.size());
-  Moved moved{MatrixXd(run.run().samples(), channels + (with_angle ? 1 : 0)), p.offset[0]};
-  for (Index c = 0; c < channels; ++c) {
-    const auto which = static_cast<std::size_t>(c);
-    moved.residual.col(c) = weighted(run.channel_weight(which), run.run().channel(p.channels[which]).value, p.output.col(c));
+/// With the time column's rate too high by 1 at nominal rates of the shaft: everything but the shaft goes as much faster in nominal time, and the shaft as much slower in its own.
+void add_clock(const LinearSystem& system, double rate, SystemSlope& slope) {
+  MatrixXd A = system.A.value, B = system.B.value, C = MatrixXd::Zero(system.C.rows(), system.C.cols());
+  if (const Index motion = system.motion; motion >= 0) {
+    A.col(motion + 1).setZero();
+    A.col(motion + 2) *= -1;
+    A.middleRows(motion, 3).setZero();
+    B.middleRows(motion, 3).setZero();
+    C.col(motion + 1) = -system.C.value.col(motion + 1);
+    C.col(motion + 2) = -2 * system.C.value.col(motion + 2);
   }
-  if (with_angle) moved.residual.col(channels) = weighted(run.angle_weight(), run.run().channel("alpha").value, p.motion.angle.array() + p.angle_offset[0]);
-  if (const double unit = reading_of_steady_load(run); unit != 0) moved.offset *= gauge_factor / unit;
-  return moved;
+  slope.A += rate * A;
+  slope.B += rate * B;
+  slope.C += rate * C;
 }
 
-/// A model whose laws search for their motion answers only to within that search: differences over as much as tells from it.
-constexpr double of_linear = 1e-4, of_nonlinear = 0.03;  // standard deviations of a number
+/// The slopes of one run's system at the present numbers.
+class SystemSlopes {
+ public:
+  SystemSlopes(const Arrival& at, const StatedNumbers& numbers, const VectorXd& z, std::size_t r) : at_(at), numbers_(numbers), z_(z), r_(r), run_(at.joint.runs()[r]), conditions_(run_.conditions()) {
+    conditions_.force = conditions_.mount = conditions_.ports = true;  // as AeroelasticModel::system has them before an effect
+    const VectorXd theta = at.joint.theta(r);
+    const AeroelasticModel here = model_of(at.model->rig());
+    theta_ = theta.head(static_cast<Index>(here.parameters().size()));
+    start_ = here.start_values();
+    system_ = here.system(conditions_, theta_, run_.channels());
+  }
 
-double step_of(const RunResidual& run, const VectorXd& theta) { return run.largest_arguments(theta).size() > 0 ? of_nonlinear : of_linear; }
+  Index own_parameters() const { return theta_.size(); }
 
-/// Run `r` of the fit with one deviation moved by `step`.
-Moved moved_run(const Arrival& at, const StatedNumbers& numbers, const VectorXd& z, Index deviation, double step, std::size_t r) {
+  /// By central differences of its matrices, which depend on the numbers smoothly however long the record is.
+  SystemSlope of(Index deviation) const {
+    constexpr double step = 1e-3;  // of a standard deviation: per cents of numbers, and third derivatives of the order of the first, leave 1e-10
+    SystemSlope slope{MatrixXd::Zero(system_.A.rows(), system_.A.cols()), MatrixXd::Zero(system_.B.rows(), system_.B.cols()), MatrixXd::Zero(system_.C.rows(), system_.C.cols()),
+                      MatrixXd::Zero(system_.D.rows(), system_.D.cols()), 0, 0};
+    if (!numbers_.acts(r_, deviation)) return slope;
+    add_difference(deviation, step, 1 / (2 * step), slope);
+    add_difference(deviation, -step, -1 / (2 * step), slope);
+    const VectorXd off = numbers_.errors_of_run(r_, VectorXd::Unit(z_.size(), deviation));
+    const Run& stated = numbers_.stated_run(r_);
+    if (const double rate = relative(stated, off, GivenNumber::clock); rate != 0) add_clock(system_, rate, slope);
+    if (const double force = relative(stated, off, GivenNumber::force_calibration); force != 0) {
+      slope.B.col(0) += force * system_.B.value.col(0);
+      slope.D.col(0) += force * system_.D.value.col(0);
+    }
+    slope.gauge = relative(stated, off, GivenNumber::calibration);
+    if (run_.channels().front() == "gauge") {  // the reading stays, the model reads less
+      slope.C.row(0) -= slope.gauge * system_.C.value.row(0);
+      slope.D.row(0) -= slope.gauge * system_.D.value.row(0);
+    }
+    return slope;
+  }
+
+ private:
+  AeroelasticModel model_of(Rig rig) const {
+    rig.gauge_filters.clear();
+    rig.laws.clear();
+    const Basis& basis = at_.model->basis();
+    Basis own = rig.is_modal() ? Basis{} : make_basis(rig, basis.normal_modes, basis.torsion_modes);
+    return {std::move(rig), std::move(own), at_.model->circulation()};
+  }
+
+  void add_difference(Index deviation, double step, double weight, SystemSlope& slope) const {
+    const VectorXd there = z_ + step * VectorXd::Unit(z_.size(), deviation);
+    const Run head = numbers_.head_at(r_, there);
+    const AeroelasticModel model = model_of(numbers_.rig_at(there));
+    Conditions conditions = conditions_;
+    conditions.speed = head.speed;
+    conditions.density = head.density;
+    VectorXd theta = theta_;
+    for (const Unknown& u : at_.joint.unknowns())  // what is held at the rig file's number goes with it
+      if (u.held && u.parameter < theta.size()) theta[u.parameter] += model.start_values()[u.parameter] - start_[u.parameter];
+    const LinearSystem system = model.system(conditions, theta, run_.channels());
+    slope.A += weight * system.A.value;
+    slope.B += weight * system.B.value;
+    slope.C += weight * system.C.value;
+    slope.D += weight * system.D.value;
+    if (reading_of_steady_load(run_) != 0) slope.unit += weight * std::log(gauge_reading_of_unit_coefficient(model.rig(), head.density, head.speed));
+  }
+
+  const Arrival& at_;
+  const StatedNumbers& numbers_;
+  const VectorXd& z_;
+  std::size_t r_;
+  const RunResidual& run_;
+  Conditions conditions_;
+  VectorXd theta_, start_;
+  LinearSystem system_;
+};
+
+/// The deviations as parameters of a model, all of them 0: what the model makes of its own parameters, exact slopes along the record, it then makes of them.
+std::shared_ptr<const Effect> as_effect(const std::shared_ptr<const std::vector<SystemSlope>>& slopes) {
+  auto e = std::make_shared<Effect>();
+  e->id = "stated-numbers";
+  for (std::size_t k = 0; k < slopes->size(); ++k) e->parameters.push_back({std::to_string(k), "1", 0, -1e9, 1e9, false});
+  e->acts = [](const Rig&, const Conditions&) { return true; };
+  e->apply = [slopes](LinearSystem& system, const EffectContext& context) {
+    for (std::size_t k = 0; k < slopes->size(); ++k) {
+      const SystemSlope& slope = (*slopes)[k];
+      const Index parameter = context.first_parameter + static_cast<Index>(k);
+      const auto add = [&](DualMatrix& to, const MatrixXd& change) {
+        if (change.isZero(0)) return;
+        to.partial.resize(static_cast<std::size_t>(context.theta.size()));
+        to.add_partial(parameter, change);
+      };
+      add(system.A, slope.A);
+      add(system.B, slope.B);
+      add(system.C, slope.C);
+      add(system.D, slope.D);
+    }
+  };
+  return e;
+}
+
+/// The columns of an effect that comes first, behind those of all others.
+MatrixXd with_deviations_last(const MatrixXd& columns, Index own, Index deviations) {
+  MatrixXd sorted(columns.rows(), columns.cols());
+  const Index others = columns.cols() - own - deviations;
+  sorted << columns.leftCols(own), columns.rightCols(others), columns.middleCols(own, deviations);
+  return sorted;
+}
+
+void look_at_run(const Arrival& at, const StatedNumbers& numbers, const VectorXd& z, std::size_t r, NumberSlopes& slopes) {
   const RunResidual& now = at.joint.runs()[r];
-  const VectorXd there = z + step * VectorXd::Unit(z.size(), deviation);
-  const double gain = numbers.gauge_factor(r, there) / numbers.gauge_factor(r, z);  // the readings stay, and their noise: the model reads less
-  Rig rig = numbers.rig_at(there);
-  if (gain != 1) amplify(rig, 1 / gain);
-  Run run = numbers.run_at(r, there);
-  for (Channel& channel : run.channels)
-    if (channel.name == "gauge") channel.value = now.run().channel("gauge").value;
-  const Basis& basis = at.model->basis();
-  AeroelasticModel model(rig, rig.is_modal() ? Basis{} : make_basis(rig, basis.normal_modes, basis.torsion_modes), at.model->circulation());
-  if (!at.model->effect_ids().empty()) model = model.with_effects(at.model->effect_ids());
-  RunResidual residual(model, run, at.windows[r]);
-  residual.keep_noise_of(now);
-  residual.follow_in(now.finer());
-  residual.start_from(now);
-  VectorXd theta = at.joint.theta(r);
-  for (const Unknown& u : at.joint.unknowns())  // what is held at the rig file's number goes with it
-    if (u.held) theta[u.parameter] += model.parameters()[static_cast<std::size_t>(u.parameter)].start - at.joint.parameter(u).start;
-  return look_at(residual, theta, gain);
+  const Index deviations = numbers.deviations();
+  const SystemSlopes system(at, numbers, z, r);
+  auto table = std::make_shared<std::vector<SystemSlope>>(static_cast<std::size_t>(deviations));
+  in_parallel(table->size(), [&](std::size_t k) { (*table)[k] = system.of(static_cast<Index>(k)); });
+
+  Rig rig = at.model->rig();
+  rig.laws.push_back(as_effect(table));
+  std::vector<std::string> ids{rig.laws.back()->id};
+  ids.insert(ids.end(), at.model->effect_ids().begin(), at.model->effect_ids().end());
+  const AeroelasticModel model = AeroelasticModel(rig, at.model->basis(), at.model->circulation()).with_effects(ids);
+  RunResidual run(model, now.run(), at.windows[r]);
+  run.keep_noise_of(now);
+  run.follow_in(now.finer());
+  run.start_from(now);
+  const VectorXd theta = at.joint.theta(r);
+  const Index own = system.own_parameters();
+  VectorXd extended = VectorXd::Zero(theta.size() + deviations);
+  extended.head(own) = theta.head(own);
+  extended.tail(theta.size() - own) = theta.tail(theta.size() - own);
+
+  slopes.runs[r] = run.sensitivity(extended);
+  for (RunResidual::Sensitivity::PerChannel& channel : slopes.runs[r].channels) channel.slope = with_deviations_last(channel.slope, own, deviations);
+  const RunResidual::Evaluation e = run.evaluate(extended, Partials::all);
+  const double offset = e.linear[run.first_offset()];
+  for (Index k = 0; k < deviations; ++k) {
+    const SystemSlope& slope = (*table)[static_cast<std::size_t>(k)];
+    slopes.offset(static_cast<Index>(r), k) = e.linear_slope(run.first_offset(), own + k) + offset * (slope.gauge - slope.unit);
+  }
 }
 
 }  // namespace
@@ -138,16 +245,21 @@ Rig StatedNumbers::rig_at(const VectorXd& z) const {
 
 Run StatedNumbers::run_at(std::size_t run, const VectorXd& z) const {
   const Run& stated = (*runs_)[run];
-  if (!stated.givens) return stated;
-  return with_errors(stated, spread_.middleRows(first_number_[run], static_cast<Index>(stated.givens->numbers.size())) * z);
+  return stated.givens ? with_errors(stated, errors_of_run(run, z)) : stated;
 }
 
-double StatedNumbers::gauge_factor(std::size_t run, const VectorXd& z) const {
+VectorXd StatedNumbers::errors_of_run(std::size_t run, const VectorXd& z) const {
   const Run& stated = (*runs_)[run];
-  if (!stated.givens) return 1;
-  for (std::size_t i = 0; i < stated.givens->numbers.size(); ++i)
-    if (const Given& g = stated.givens->numbers[i]; g.number == GivenNumber::calibration) return 1 + spread_.row(first_number_[run] + static_cast<Index>(i)).dot(z) / g.value;
-  return 1;
+  return stated.givens ? VectorXd(spread_.middleRows(first_number_[run], static_cast<Index>(stated.givens->numbers.size())) * z) : VectorXd();
+}
+
+Run StatedNumbers::head_at(std::size_t run, const VectorXd& z) const {
+  const Run& stated = (*runs_)[run];
+  Run head;
+  head.speed = stated.speed;
+  head.density = stated.density;
+  head.givens = stated.givens;
+  return stated.givens ? with_errors(head, errors_of_run(run, z)) : head;
 }
 
 bool StatedNumbers::acts(std::size_t run, Index deviation) const {
@@ -158,30 +270,8 @@ bool StatedNumbers::acts(std::size_t run, Index deviation) const {
 
 NumberSlopes number_slopes(const Arrival& at, const StatedNumbers& numbers, const VectorXd& z) {
   const std::vector<RunResidual>& runs = at.joint.runs();
-  const auto parameters = static_cast<Index>(at.model->parameters().size()), deviations = numbers.deviations();
-  NumberSlopes slopes{std::vector<RunResidual::Sensitivity>(runs.size()), MatrixXd::Zero(static_cast<Index>(runs.size()), deviations)};
-  std::vector<double> step(runs.size()), unit(runs.size());
-  in_parallel(runs.size(), [&](std::size_t r) {
-    const VectorXd theta = at.joint.theta(r);
-    slopes.runs[r] = runs[r].sensitivity(theta);
-    step[r] = step_of(runs[r], theta);
-    unit[r] = reading_of_steady_load(runs[r]);
-    for (RunResidual::Sensitivity::PerChannel& channel : slopes.runs[r].channels) {
-      MatrixXd& slope = channel.slope;
-      slope.conservativeResize(Eigen::NoChange, parameters + deviations);
-      slope.rightCols(deviations).setZero();
-    }
-  });
-  in_parallel(static_cast<std::size_t>(deviations), [&](std::size_t k) {
-    const auto deviation = static_cast<Index>(k);
-    for (std::size_t r = 0; r < runs.size(); ++r) {
-      if (!numbers.acts(r, deviation) || runs[r].is_aside()) continue;
-      const Moved more = moved_run(at, numbers, z, deviation, step[r], r), less = moved_run(at, numbers, z, deviation, -step[r], r);
-      const MatrixXd slope = (less.residual - more.residual) / (2 * step[r]);  // of the prediction
-      for (Index c = 0; c < slope.cols(); ++c) slopes.runs[r].channels[static_cast<std::size_t>(c)].slope.col(parameters + deviation) = slope.col(c);
-      slopes.offset(static_cast<Index>(r), deviation) = (more.offset - less.offset) / (2 * step[r]) * (unit[r] != 0 ? unit[r] : 1);
-    }
-  });
+  NumberSlopes slopes{std::vector<RunResidual::Sensitivity>(runs.size()), MatrixXd::Zero(static_cast<Index>(runs.size()), numbers.deviations())};
+  in_parallel(runs.size(), [&](std::size_t r) { look_at_run(at, numbers, z, r, slopes); });
   return slopes;
 }
 

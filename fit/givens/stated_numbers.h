@@ -21,8 +21,10 @@ class StatedNumbers {
   /// Rig and run with their numbers off by these. Throw std::invalid_argument where no rig is such (core/rig/givens.h).
   Rig rig_at(const Eigen::VectorXd& z) const;
   Run run_at(std::size_t run, const Eigen::VectorXd& z) const;
-  /// By how much the reading of the gauge, and so the column of the run, is larger than stated.
-  double gauge_factor(std::size_t run, const Eigen::VectorXd& z) const;
+  /// The run's speed and density, without its readings, and the errors of what its head states.
+  Run head_at(std::size_t run, const Eigen::VectorXd& z) const;
+  Eigen::VectorXd errors_of_run(std::size_t run, const Eigen::VectorXd& z) const;
+  const Run& stated_run(std::size_t run) const { return (*runs_)[run]; }
   /// Whether the deviation is in anything that the run depends on.
   bool acts(std::size_t run, Eigen::Index deviation) const;
 
@@ -51,7 +53,9 @@ struct NumberSlopes {
   Eigen::MatrixXd offset;                      ///< runs x deviations: d offset of the first channel, as if its conversion into a load stayed what it is
 };
 
-/// At the present values of the fit and at z, by central differences of the rig and of the runs: each is one evaluation of the runs without derivatives.
+/// At the present values of the fit, which stands at z. The deviations are parameters of each run's linear system, with slopes from central differences of its matrices, and are followed along the record
+/// as the model's own are: Kaufman's rule for what is linear, like theirs. (Differences of residuals keep the rule's other term, which looks like information on numbers that only noise tells.)
+/// Effects take the numbers as they are.
 NumberSlopes number_slopes(const Arrival& at, const StatedNumbers& numbers, const Eigen::VectorXd& z);
 
 }  // namespace unrig

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <functional>
 #include <random>
 
 #include <nlohmann/json.hpp>
@@ -13,7 +14,6 @@
 #include "fit/fit_files.h"
 #include "fit/givens/price.h"
 #include "tests/support/sample_data.h"
-#include "tests/support/slope_check.h"
 #include "tests/support/stated.h"
 
 namespace unrig {
@@ -54,30 +54,47 @@ std::shared_ptr<const Givens> one_per_cent_of_the_calibration() {
   return std::make_shared<const Givens>(g);
 }
 
-TEST(NumberSlopes, AreTheSlopesOfTheResidual) {
-  FitProblem problem = null_problem({"wet_pluck"});
+/// Of readings without noise, what is left where numbers are off by h has the slope that is said, to the order of h: a wrong one halves with h, the right one's miss goes down to a quarter.
+void expect_slopes(const std::string& name, const std::string& head) {
+  FitProblem problem = null_problem({name});
   problem.rig = rig_that_states("mass.std_percent = 1.0");
-  problem.runs = {test::run_that_states(test::null_campaign("wet_pluck.csv"), "clock_std_percent = 0.1\n# density_std_percent = 0.5")};
-  const StatedNumbers numbers(problem.rig, problem.runs);
-  ASSERT_EQ(numbers.deviations(), 17 + 2);
+  problem.runs = {test::run_that_states(test::null_campaign(name + ".csv"), head)};
+  unrig::Run& run = problem.runs.front();
   const auto model = std::make_shared<const AeroelasticModel>(model_of(problem.rig, problem.runs, problem.circulation));
   const VectorXd theta = model->start_values();
-  Arrival at{model, {{}}, JointProblem(*model, {RunResidual(*model, problem.runs.front(), {})})};
-  const RunResidual& run = at.joint.runs().front();
-  const NumberSlopes slopes = number_slopes(at, numbers, VectorXd::Zero(19));
-  const MatrixXd slope = -slopes.runs.front().channels.front().slope.rightCols(19);
-  const auto residual = [&](const VectorXd& z) -> VectorXd {
+  const std::vector<MotionBasis::Window> windows = motion_windows(run);
+  const RunResidual noisy(*model, run, windows);
+  const RunResidual::Prediction p = noisy.predict(theta);
+  for (Channel& channel : run.channels) {
+    if (channel.name == "gauge") channel.value = p.output.col(0);
+    if (channel.name == "alpha" && !windows.empty()) channel.value = p.motion.angle.array() + p.angle_offset[0];
+  }
+  const StatedNumbers numbers(problem.rig, problem.runs);
+  const Index count = numbers.deviations();
+  Arrival at{model, {windows}, JointProblem(*model, {RunResidual(*model, run, windows)})};
+  const RunResidual& here = at.joint.runs().front();
+  const NumberSlopes slopes = number_slopes(at, numbers, VectorXd::Zero(count));
+  const auto left = [&](const VectorXd& z) -> VectorXd {
     const Rig rig = numbers.rig_at(z);
     const unrig::Run moved = numbers.run_at(0, z);
     const AeroelasticModel there(rig, make_basis(rig, model->basis().normal_modes, model->basis().torsion_modes), model->circulation());
-    RunResidual other(there, moved, {});
-    other.keep_noise_of(run);
-    return run.channel_weight(0).cwiseProduct(moved.channel("gauge").value - other.predict(theta).output.col(0));
+    RunResidual other(there, moved, windows);
+    other.keep_noise_of(here);
+    return here.channel_weight(0).cwiseProduct(run.channel("gauge").value - other.predict(theta).output.col(0)) / here.channel_weight(0).norm();
   };
-  for (const Index k : {Index{0}, Index{12}, Index{16}, Index{17}, Index{18}}) {
-    const test::Slope found = test::slope_along(residual, slope, VectorXd::Zero(19), VectorXd::Unit(19, k), 0.03, 1e-10);
-    EXPECT_TRUE(found.exact || found.order > 1.8) << numbers.groups()[static_cast<std::size_t>(k)] << ": order " << found.order;
+  const VectorXd at_zero = left(VectorXd::Zero(count));
+  for (Index k = 0; k < count; ++k) {
+    const VectorXd slope = -slopes.runs.front().channels.front().slope.col(theta.size() + k) / here.channel_weight(0).norm(), direction = VectorXd::Unit(count, k);
+    const auto miss = [&](double h) { return (left(h * direction) - at_zero - h * slope).norm(); };
+    constexpr double h = 0.02;
+    const double first = miss(h), second = miss(h / 2);
+    EXPECT_TRUE(std::log2(first / second) > 1.8 || first < 1e-3 * h * slope.norm() || first < 1e-9) << name << ", " << numbers.groups()[static_cast<std::size_t>(k)] << " " << k << ": " << first << ", then " << second << " of " << h * slope.norm();
   }
+}
+
+TEST(NumberSlopes, AreTheSlopesOfWhatIsLeft) {
+  expect_slopes("wet_pluck", "clock_std_percent = 0.1\n# density_std_percent = 0.5");
+  expect_slopes("step_b", "clock_std_percent = 0.1\n# density_std_percent = 0.5\n# speed_std_percent = 0.5");
 }
 
 TEST(InexactRig, NumbersKnownToAMillionthLeaveTheFitAsItIs) {
@@ -94,19 +111,46 @@ TEST(InexactRig, NumbersKnownToAMillionthLeaveTheFitAsItIs) {
   }
 }
 
-/// Masses, stiffness and apparent mass that are all larger by the same part move the same: the recordings say nothing of what is common to the masses.
-TEST(InexactRig, WhatTheRecordingsCannotTellStaysInTheErrors) {
+/// What fits of rig files and runs that are off by one standard deviation to either side, each taken for exact, make of an error that is stated: chi-square along it is a parabola,
+/// and the parameters go with it in a straight line.
+struct Parabola {
+  FitResult less, here, more;
+  double reading = 0;  ///< by so much the gauge's readings, and so their noise, are larger in `more`
+  /// At the noise levels of the fit in the middle: each fit estimates its own.
+  double chi2(const FitResult& fit) const {
+    const double larger = &fit == &more ? 1 + reading : &fit == &less ? 1 - reading : 1;
+    double sum = 0;
+    for (std::size_t r = 0; r < fit.runs.size(); ++r)
+      for (std::size_t c = 0; c < fit.runs[r].channels.size(); ++c)
+        sum += static_cast<double>(fit.runs[r].channels[c].samples) * std::pow(fit.runs[r].channels[c].rms_residual / here.runs[r].channels[c].noise / (c == 0 ? larger : 1), 2);
+    return sum;
+  }
+  double curvature() const { return (chi2(more) + chi2(less) - 2 * chi2(here)) / 2; }
+  double left() const { return 1 / std::sqrt(1 + curvature()); }                              ///< of the standard deviation
+  double shift() const { return -(chi2(more) - chi2(less)) / 4 / (1 + curvature()); }           ///< standard deviations
+  double slope(const std::string& name, const std::string& run) const { return (parameter(more, name, run).value - parameter(less, name, run).value) / 2; }
+  double error(const std::string& name, const std::string& run) const { return std::hypot(parameter(here, name, run).std_error, slope(name, run) * left()); }
+};
+
+Parabola parabola(const std::function<FitProblem(double)>& off) { return {fit(off(-1)), fit(off(0)), fit(off(1)), 0}; }
+
+void expect_agreement(const FitResult& stated, const Parabola& exact, const std::vector<std::pair<std::string, std::string>>& parameters) {
+  const FittedGiven& g = stated.givens.front();
+  EXPECT_NEAR(g.std_error / g.stated_std / exact.left(), 1, 0.1);
+  EXPECT_NEAR((g.value - g.stated) / g.stated_std, exact.shift(), 0.2 * exact.left());
+  for (const auto& [name, run] : parameters) EXPECT_NEAR(parameter(stated, name, run).std_error / exact.error(name, run), 1, 0.1) << name;
+}
+
+TEST(InexactRig, MassesThatShareAnErrorGoWithStiffnessAndApparentMass) {
+  const Parabola exact = parabola([](double z) {
+    FitProblem problem = null_problem(plucks);
+    problem.rig.normal.inertia *= 1 + 0.01 * z;
+    return problem;
+  });
   FitProblem problem = null_problem(plucks);
   problem.rig = rig_that_states("mass.common_std_percent = 1.0");
   const FitResult result = fit(problem);
-  for (const char* name : {"normal.stiffness_scale", "apparent_mass_coefficient"}) {
-    const FittedParameter& p = parameter(result, name);
-    EXPECT_NEAR(p.std_error / p.value, 0.01, 3e-4) << name;
-  }
-  for (const FittedGiven& g : result.givens) {
-    EXPECT_NEAR(g.std_error / g.stated_std, 1, 0.02) << g.name;
-    EXPECT_NEAR((g.value - g.stated) / g.stated_std, 0, 0.2) << g.name;
-  }
+  expect_agreement(result, exact, {{"normal.stiffness_scale", ""}, {"apparent_mass_coefficient", ""}});
   // They go together: one per cent in the one is one per cent in the other.
   const auto kn = static_cast<Index>(&parameter(result, "normal.stiffness_scale") - result.parameters.data()), mass = static_cast<Index>(result.parameters.size()) + 12;
   const MatrixXd& c = result.joint_covariance;
@@ -147,15 +191,28 @@ TEST(InexactRig, ErrorsCoverMassesThatAreOffByWhatIsStated) {
   EXPECT_LT(sum, 32.9);
 }
 
-TEST(InexactRig, ACalibrationIsAsUncertainAsTheSlopesAreAndLeavesTheRigAlone) {
-  const FitResult exact = fit(null_problem(five_runs));
-  FitProblem problem = null_problem(five_runs);
-  for (unrig::Run& run : problem.runs) run.givens = one_per_cent_of_the_calibration();
-  const FitResult result = fit(problem);
-  const FittedParameter &slope = parameter(result, "normal_force_slope", "step_b"), &kn = parameter(result, "normal.stiffness_scale");
-  EXPECT_NEAR(slope.std_error / slope.value, 0.01, 1e-3);
-  EXPECT_NEAR(kn.std_error / parameter(exact, "normal.stiffness_scale").std_error, 1, 0.05);
-  EXPECT_EQ(result.runs.front().fingerprint, exact.runs.front().fingerprint) << "the recording is the same";
+TEST(InexactRig, CalibrationAndSpeedAreAsFitsOfChangedRunsSay) {
+  for (const std::string what : {"calibration", "speed"}) {
+    SCOPED_TRACE(what);
+    Parabola exact = parabola([&](double z) {
+      FitProblem problem = null_problem(five_runs);
+      for (unrig::Run& run : problem.runs) {
+        if (what == "speed") run.speed *= 1 + 0.01 * z;
+        else
+          for (Channel& channel : run.channels)
+            if (channel.name == "gauge") channel.value *= 1 + 0.01 * z;
+      }
+      return problem;
+    });
+    if (what == "calibration") exact.reading = 0.01;
+    FitProblem problem = null_problem(five_runs);
+    for (std::size_t r = 0; r < problem.runs.size(); ++r)
+      if (what == "calibration") problem.runs[r].givens = one_per_cent_of_the_calibration();
+      else problem.runs[r] = test::run_that_states(problem.runs[r].file, "speed_std_percent = 1.0");
+    const FitResult result = fit(problem);
+    expect_agreement(result, exact, {{"normal.stiffness_scale", ""}, {"normal_force_slope", "step_b"}});
+    EXPECT_EQ(result.runs.front().fingerprint, exact.here.runs.front().fingerprint) << "the recording is the same";
+  }
 }
 
 TEST(InexactRig, ItsFileHoldsTheNumbersAndComesBack) {
@@ -171,6 +228,7 @@ TEST(InexactRig, ItsFileHoldsTheNumbersAndComesBack) {
   EXPECT_THAT(report(result), HasSubstr("[[Givens]]"));
 }
 
+/// Measured with fits of changed files when the issue was written, printed to a tenth of a per cent or as below; the slope's answer to the speed differs from run to run, from -1.7 to -1.9.
 TEST(Price, OfOnePerCentIsWhatFitsOfChangedFilesGave) {
   const FitProblem problem = null_problem(five_runs);
   const PriceList list = price_of_numbers(problem, fit(problem));
@@ -186,7 +244,12 @@ TEST(Price, OfOnePerCentIsWhatFitsOfChangedFilesGave) {
   EXPECT_NEAR(of("normal.mass", "apparent_mass_coefficient"), 1, printed);
   EXPECT_NEAR(of("section.chord", "apparent_mass_coefficient"), -2, printed);
   EXPECT_NEAR(of("section.chord", "normal_force_slope"), -0.8, printed);
-  EXPECT_NEAR(of("speed", "normal_force_slope"), -1.9, printed);
+  FitProblem faster = problem;
+  for (unrig::Run& run : faster.runs) run.speed *= 1.01;
+  const FitResult here = fit(problem), there = fit(faster);
+  double speed = 0;
+  for (const char* run : {"step_a", "step_b", "step_c"}) speed += 100.0 / 3 * (parameter(there, "normal_force_slope", run).value / parameter(here, "normal_force_slope", run).value - 1);
+  EXPECT_NEAR(of("speed", "normal_force_slope"), speed, 0.03) << "bent by as much over one per cent";
   EXPECT_NEAR(of("clock", "normal.stiffness_scale"), -0.2, printed / 10);
   EXPECT_NEAR(of("density", "apparent_mass_coefficient") / 2, -0.5, printed / 2);
 }
