@@ -70,7 +70,8 @@ class RepeatedStamps {
     // Gaps lengthen the mean, repeated stamps shorten it.
     const double typical = median(interval);
     step_ = typical > 0 ? std::min(typical, interval.mean()) : 0;
-    fine_ = 2 * last_digit(stamps_) <= step_;
+    constexpr double slack = 1.01;  // for the round-off of decimal fractions
+    fine_ = typical > 0 && 2 * last_digit(stamps_) <= slack * typical;
   }
 
   Stamps treated(TimeGrid& grid) {
