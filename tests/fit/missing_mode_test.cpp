@@ -84,6 +84,7 @@ TEST(MissingMode, IsNamedOnARigOfModes) {
   problem.rig = one_mode();
   problem.runs = {pluck_of(two_tones(1, 0.3), 1), pluck_of(two_tones(0.7, -0.4), 2)};
   problem.verdict_only = true;
+  problem.effects = {"higher-mode", "cubic-stiffness", "coulomb-friction", "quadratic-drag", "cubic-damping"};
   const Diagnosis d = diagnose(problem);
   ASSERT_EQ(d.missing.size(), 1u);
   EXPECT_EQ(d.missing.front().effect, "higher-mode");
