@@ -111,10 +111,11 @@ TEST(InexactRig, NumbersKnownToAMillionthLeaveTheFitAsItIs) {
   }
 }
 
-/// What fits of rig files and runs that are off by one standard deviation to either side, each taken for exact, make of an error that is stated: chi-square along it is a parabola,
+/// What fits of rig files and runs that are off by `step` standard deviations to either side, each taken for exact, make of an error that is stated: chi-square along it is a parabola,
 /// and the parameters go with it in a straight line.
 struct Parabola {
   FitResult less, here, more;
+  double step = 1;
   double reading = 0;  ///< by so much the gauge's readings, and so their noise, are larger in `more`
   /// At the noise levels of the fit in the middle: each fit estimates its own.
   double chi2(const FitResult& fit) const {
@@ -125,14 +126,14 @@ struct Parabola {
         sum += static_cast<double>(fit.runs[r].channels[c].samples) * std::pow(fit.runs[r].channels[c].rms_residual / here.runs[r].channels[c].noise / (c == 0 ? larger : 1), 2);
     return sum;
   }
-  double curvature() const { return (chi2(more) + chi2(less) - 2 * chi2(here)) / 2; }
+  double curvature() const { return (chi2(more) + chi2(less) - 2 * chi2(here)) / 2 / step / step; }
   double left() const { return 1 / std::sqrt(1 + curvature()); }                              ///< of the standard deviation
-  double shift() const { return -(chi2(more) - chi2(less)) / 4 / (1 + curvature()); }           ///< standard deviations
-  double slope(const std::string& name, const std::string& run) const { return (parameter(more, name, run).value - parameter(less, name, run).value) / 2; }
+  double shift() const { return -(chi2(more) - chi2(less)) / 4 / step / (1 + curvature()); }           ///< standard deviations
+  double slope(const std::string& name, const std::string& run) const { return (parameter(more, name, run).value - parameter(less, name, run).value) / 2 / step; }
   double error(const std::string& name, const std::string& run) const { return std::hypot(parameter(here, name, run).std_error, slope(name, run) * left()); }
 };
 
-Parabola parabola(const std::function<FitProblem(double)>& off) { return {fit(off(-1)), fit(off(0)), fit(off(1)), 0}; }
+Parabola parabola(const std::function<FitProblem(double)>& off, double step) { return {fit(off(-step)), fit(off(0)), fit(off(step)), step, 0}; }
 
 void expect_agreement(const FitResult& stated, const Parabola& exact, const std::vector<std::pair<std::string, std::string>>& parameters) {
   const FittedGiven& g = stated.givens.front();
@@ -146,7 +147,7 @@ TEST(InexactRig, MassesThatShareAnErrorGoWithStiffnessAndApparentMass) {
     FitProblem problem = null_problem(plucks);
     problem.rig.normal.inertia *= 1 + 0.01 * z;
     return problem;
-  });
+  }, 1);
   FitProblem problem = null_problem(plucks);
   problem.rig = rig_that_states("mass.common_std_percent = 1.0");
   const FitResult result = fit(problem);
@@ -203,8 +204,8 @@ TEST(InexactRig, CalibrationAndSpeedAreAsFitsOfChangedRunsSay) {
             if (channel.name == "gauge") channel.value *= 1 + 0.01 * z;
       }
       return problem;
-    });
-    if (what == "calibration") exact.reading = 0.01;
+    }, what == "calibration" ? 0.1 : 1);  // of which the recordings know so much that it bends over one per cent
+    if (what == "calibration") exact.reading = 0.001;
     FitProblem problem = null_problem(five_runs);
     for (std::size_t r = 0; r < problem.runs.size(); ++r)
       if (what == "calibration") problem.runs[r].givens = one_per_cent_of_the_calibration();
