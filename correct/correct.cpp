@@ -46,7 +46,7 @@ VectorXd wagner_amplitudes(const VectorXd& rates, double semichords) {
 void check(const CorrectProblem& problem) {
   const Run& run = problem.run;
   if (problem.rig.is_modal()) throw InputError({problem.rig.file, 0}, "a rig known only as modes", "wanted a rig with a section and strips", "Describe the section: without it there is no load to separate.");
-  if (!run.find("alpha")) throw InputError({run.file, 0}, "no column 'alpha'", "wanted the measured angle of attack", "Record the angle beside the gauge.");
+  run.channel("alpha");
   if (!(run.speed > 0)) throw InputError({run.file, 0}, "speed 0", "wanted a run in a stream", "Circulation needs a stream; free decays are for `unrig fit`.");
   check_what_drives(run);
   check_reading_changes(run, "gauge");

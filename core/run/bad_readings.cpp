@@ -308,7 +308,14 @@ std::vector<Index> clipped_readings(const VectorXd& x) {
 
 double robust_range(const VectorXd& x) {
   const Range range = range_of(x);
-  return range.high - range.low;
+  if (range.high > range.low) return range.high - range.low;
+  // Of a few readings the medians are one and the same.
+  double low = std::numeric_limits<double>::infinity(), high = -low;
+  constexpr Index few = 5;
+  if (x.size() > few) return 0;
+  for (const double value : x)
+    if (std::isfinite(value)) low = std::min(low, value), high = std::max(high, value);
+  return high > low ? high - low : 0;
 }
 
 }  // namespace unrig

@@ -13,6 +13,7 @@
 #include <utility>
 
 #include "core/run/bad_readings.h"
+#include "core/run/column_names.h"
 #include "core/files/csv_table.h"
 #include "core/run/run_limits.h"
 #include "core/rig/stated_errors.h"
@@ -405,7 +406,10 @@ const Channel& Run::channel(std::string_view column) const {
   if (const Channel* found = find(column)) return *found;
   std::vector<std::string> names;
   for (const Channel& one : channels) names.push_back(one.name);
-  throw InputError({file, 0}, fmt::format("the run has no column \"{}\" of numbers, but: {}", column, fmt::join(names, ", ")),
+  std::string meant;
+  for (const std::string& name : names)
+    if (meant_column(name, names) == column) meant = fmt::format("; there is a column \"{}\"", name);
+  throw InputError({file, 0}, fmt::format("the run has no column \"{}\" of numbers, but: {}{}", column, fmt::join(names, ", "), meant),
                    fmt::format("wanted a column \"{}\"", column), "");
 }
 

@@ -46,9 +46,10 @@ HowFarToTrust HowFarToTrust::of_table(const CsvTable& table) {
   HowFarToTrust trust{std::numeric_limits<double>::quiet_NaN(), {}, {}, {}};
   for (const CsvColumn& column : table.columns) {
     if (column.name == chi2_column && column.value.size() > 0) trust.reduced_chi2 = column.value[0];
-    if (column.name.starts_with(warning_column)) trust.warnings.push_back(column.name.substr(warning_column.size()));
-    if (column.name.starts_with(MadeBy::prefix)) trust.made_by = MadeBy::of_column(std::string_view(column.name).substr(MadeBy::prefix.size()));
-    if (column.name.starts_with(no_answer_column)) trust.no_answer = column.name.substr(no_answer_column.size());
+    const std::string name = column.unit.empty() ? column.name : fmt::format("{} ({})", column.name, column.unit);  // brackets at the end of a text are no unit
+    if (name.starts_with(warning_column)) trust.warnings.push_back(name.substr(warning_column.size()));
+    if (name.starts_with(MadeBy::prefix)) trust.made_by = MadeBy::of_column(std::string_view(name).substr(MadeBy::prefix.size()));
+    if (name.starts_with(no_answer_column)) trust.no_answer = name.substr(no_answer_column.size());
   }
   return trust;
 }

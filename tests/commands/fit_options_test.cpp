@@ -54,7 +54,7 @@ TEST(FitOptions, AStartBeyondItsBoundsAndAnEffectThatTheRigCannotHaveAreRefused)
   EXPECT_THAT(start.err, HasSubstr("wanted a value from"));
   const Finished effect = fit_of(directory, decay(directory), {"--effect", "tank-wave"});
   EXPECT_EQ(effect.status, 2);
-  EXPECT_THAT(effect.err, testing::AllOf(HasSubstr("rig.toml"), HasSubstr("wanted a beam rig, which the effect tank-wave needs")));
+  EXPECT_THAT(effect.err, testing::AllOf(HasSubstr("--effect: tank-wave"), HasSubstr("needs a beam rig; this one is known only as modes")));
 }
 
 TEST(FitOptions, WhatIsDeterminedIsGivenWhereAParameterIsNot) {

@@ -155,7 +155,7 @@ TEST(Report, TheToneOfACorrectionFollowsItsWarnings) {
   const std::vector<std::array<std::string, 4>> tables{{",reduced_chi2", ",1.02", ",1.02", "good"},
                                                        {",reduced_chi2,warning: a.csv: 3 samples are missing", ",1.02,1", ",1.02,1", "open"},
                                                        {",reduced_chi2,no answer: a.csv: it moves.", ",1.02,1", ",1.02,1", "bad"},
-                                                       {",reduced_chi2", ",1.6", ",1.6", "bad"},
+                                                       {",reduced_chi2", ",60", ",60", "bad"},
                                                        {"", "", "", "open"}};
   for (const auto& [header, first, second, tone] : tables) {
     const std::string file = directory.file("corrected.csv", columns + header + "\n0,0,1,1,0.1,1,0.1,1,0.1" + first + "\n1,1,1,1,0.1,1,0.1,1,0.1" + second + "\n"), output = directory.path("report.html");
@@ -203,6 +203,7 @@ TEST(Report, WritesAnErrorWithThePowerOfItsValue) {
   const TemporaryDirectory directory;
   make_results(directory);
   json fit = json::parse(read_text(directory.path("fit.json")));
+  fit["runs"] = json::array();  // only the table is looked at: no rig has such numbers
   const std::vector<std::array<double, 2>> values{{2.48411e6, 5300}, {1.1219, 0.0002}, {-1.1236e8, 1.3e4}, {3, 250}, {1e-15, 2e-17}};
   for (std::size_t k = 0; k < values.size(); ++k) fit["parameters"][k]["value"] = values[k][0], fit["parameters"][k]["std_error"] = values[k][1];
   const std::string output = directory.path("report.html");

@@ -123,7 +123,7 @@ TEST_F(SimulateCommand, WrongUseEndsWithTwoAndWritesNothing) {
       {rig_and_step() + "--release-load '2 kg'", "release load"},
       {rig_and_step() + "--release-load '2 N'", "a release load for a step"},
       {rig_and_step() + "--fit " + seed + "rig.toml", "fit.json"},
-      {"--rig " + seed + "rig.toml --run " + seed + "rig.toml -o " + output(), "wanted TOML"},
+      {"--rig " + seed + "rig.toml --run " + seed + "rig.toml -o " + output(), "this is a rig file; wanted a run file"},
       {"--rig nowhere.toml --run " + seed + "step.csv -o " + output(), "nowhere.toml"},
       {"--rig " + seed + "rig.toml --run " + seed + "step.csv -o /nowhere/out.csv", "/nowhere/out.csv"},
   };

@@ -143,7 +143,7 @@ TEST(Prior, CorrelationsOfTheRigReachTheModalLoad) {
   // A load that excites the rig's own frequency: its answer in closed form is not needed, only that the load is asked to explain this.
   VectorXd gauge(600);
   for (Index k = 0; k < gauge.size(); ++k) gauge[k] = 20 * std::sin(50 * run.time(k)) * std::exp(-std::pow((run.time(k) - 1.5) / 0.7, 2)) + 0.05 * normal(random);
-  run.channels = {{"mount_acceleration", "m/s^2", "m/s^2", 1, VectorXd::Zero(gauge.size())}, {"gauge", "N", "N", 1, gauge}};
+  run.channels = {{"mount_acceleration", "m/s^2", "m/s^2", 1, 1e-6 * VectorXd::Unit(gauge.size(), gauge.size() / 2)}, {"gauge", "N", "N", 1, gauge}};
   const auto rig_variance = [&](double correlation) {
     fit.correlation = MatrixXd::Identity(4, 4);
     fit.correlation(0, 1) = fit.correlation(1, 0) = correlation;
