@@ -27,8 +27,9 @@ Effect quadratic_drag() {
   e.parameters = {{"coefficient", "1", 0, 0, 1e4, false, "Record free decays in the fluid from a small and from a large load."}};
   e.starts = {Eigen::VectorXd::Constant(1, 2.0)};
   e.draw = [](const AeroelasticModel&, double, Effect::Random& random) { return log_between(random, {{0.3, 20}}); };
-  e.acts_in = "a fluid: with a density of 0 there is no drag on strips (damping that grows with amplitude without a fluid is cubic-damping)";
-  e.acts = [](const Rig& rig, const Conditions& c) { return rig.is_modal() || c.density > 0; };
+  e.acts_in = "a liquid: in a gas the drag of strips is a thousand times less and drowns in the damping of the rig (damping that grows with amplitude there is cubic-damping)";
+  constexpr double liquid = 100;  // kg/m^3, between every gas and every liquid at rest in a laboratory
+  e.acts = [](const Rig& rig, const Conditions& c) { return rig.is_modal() || c.density > liquid; };
   e.apply = [](LinearSystem& system, const EffectContext& c) {
     const Rig& rig = c.model.rig();
     const Eigen::Index n = system.coordinates;

@@ -290,7 +290,10 @@ TEST(Effects, SayWhyTheyCannotAct) {
   EXPECT_THAT(why_idle(effect("quadratic-drag"), two_modes(), {still}), IsEmpty()) << "there its coefficient is a force over velocity squared";
   Conditions air;
   air.density = 1.2;
-  EXPECT_THAT(why_idle(effect("quadratic-drag"), beam(), {still, air}), IsEmpty());
+  EXPECT_THAT(why_idle(effect("quadratic-drag"), beam(), {still, air}), HasSubstr("cubic-damping"));
+  Conditions water;
+  water.density = 998.2;
+  EXPECT_THAT(why_idle(effect("quadratic-drag"), beam(), {air, water}), IsEmpty());
   EXPECT_THAT(why_idle(effect("wagner-lag"), beam(), {air}), HasSubstr("stream"));
   EXPECT_THAT(why_idle(effect("wagner-lag"), two_modes(), {air}), HasSubstr("modes"));
   EXPECT_THAT(why_idle(effect("twist-stiffness"), read_rig(test::null_campaign("rig.toml")), {air}), HasSubstr("[[sensor]]"));
