@@ -52,7 +52,8 @@ with tempfile.TemporaryDirectory() as folder:
     load, same = unrig.correct(rig, result, runs[2]), unrig.correct(rig, str(folder / "fit.json"), runs[2])
     for name in ("circulatory", "circulatory_std", "normal_force", "normal_force_std"):
         printed = rows[:, header.index(name)]
-        assert np.allclose(load[name], printed, rtol=1e-5, atol=1e-6), name
+        digits = 1e-3 if name.endswith("_std") else 1e-5  # as printed
+        assert np.allclose(load[name], printed, rtol=digits, atol=1e-6), (name, float(np.max(np.abs(load[name] - printed))))
         assert np.array_equal(load[name], same[name]), name
     assert load.circulatory.attrs["units"] == "N" and load.attrs["run_fingerprint"] == unrig.read_run(runs[2]).fingerprint
     load.to_netcdf(folder / "load.nc") if hasattr(load, "to_netcdf") else None
