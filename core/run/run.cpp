@@ -407,8 +407,8 @@ const Channel& Run::channel(std::string_view column) const {
   std::vector<std::string> names;
   for (const Channel& one : channels) names.push_back(one.name);
   std::string meant;
-  for (const std::string& name : names)
-    if (meant_column(name, names) == column) meant = fmt::format("; there is a column \"{}\"", name);
+  for (const std::string& one : names)
+    if (meant_column(one, names) == column) meant = fmt::format("; there is a column \"{}\"", one);
   throw InputError({file, 0}, fmt::format("the run has no column \"{}\" of numbers, but: {}{}", column, fmt::join(names, ", "), meant),
                    fmt::format("wanted a column \"{}\"", column), "");
 }
