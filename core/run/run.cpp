@@ -284,7 +284,7 @@ void leave_out(CsvColumn& column, const std::vector<Eigen::Index>& samples) {
 /// What is said of bad readings: which column, how many of them, when the first.
 class BadReadings {
  public:
-  BadReadings(CsvTable& table, const VectorXd& seconds, Run& run) : table_(table), seconds_(seconds), run_(run) {}
+  BadReadings(CsvTable& table, const VectorXd& seconds, const std::vector<Eigen::Index>& samples, Run& run) : table_(table), seconds_(seconds), samples_(samples), run_(run) {}
 
   /// By the column's place in the table.
   std::vector<LeftOut> leave_out_all() {
@@ -314,12 +314,21 @@ class BadReadings {
     tell(column, none, fmt::format("number(s) beyond {:g}, which instruments send where they have no reading", no_reading), "They count as missing.");
   }
 
+  /// The readings that are samples: a row too many is judged by its time alone.
+  VectorXd samples_of(const CsvColumn& column) const { return samples_.empty() ? column.value : VectorXd(column.value(samples_)); }
+  std::vector<Eigen::Index> rows_of(std::vector<Eigen::Index> samples) const {
+    if (!samples_.empty())
+      for (Eigen::Index& k : samples) k = samples_[static_cast<std::size_t>(k)];
+    return samples;
+  }
+
   LeftOut judge(CsvColumn& column, bool input, std::vector<Eigen::Index>& blows) {
-    SuspectReadings suspect = isolated_readings(column.value, input ? ReadingOf::input : ReadingOf::answer, blows);
+    SuspectReadings suspect = isolated_readings(samples_of(column), input ? ReadingOf::input : ReadingOf::answer, blows);
+    suspect.isolated = rows_of(std::move(suspect.isolated));
     if (!suspect.isolated.empty()) tell(column, suspect.isolated, "isolated reading(s) far from their neighbours", "They are left out.");
     leave_out(column, suspect.isolated);
     blows.insert(blows.end(), suspect.blows.begin(), suspect.blows.end());
-    const std::vector<Eigen::Index> clipped = clipped_readings(column.value);
+    const std::vector<Eigen::Index> clipped = rows_of(clipped_readings(samples_of(column)));
     if (clipped.empty()) return {suspect.isolated.size(), 0};
     const std::string what = fmt::format("reading(s) at the end of its range, {:g} {}, which cuts the signal off", column.value[clipped.front()], column.unit);
     if (input) {
@@ -338,6 +347,7 @@ class BadReadings {
 
   CsvTable& table_;
   const VectorXd& seconds_;
+  const std::vector<Eigen::Index>& samples_;  // rows that are samples; empty: all of them
   Run& run_;
 };
 
@@ -359,7 +369,7 @@ void take_columns(CsvTable& table, const Calibrations& calibrations, Run& run) {
   check_step(table, run.dt);
   std::map<std::string, ColumnScale> scales;  // of columns without a meaning, by their unit: there may be 100 000 of them
   const VectorXd stamps = (time->value.array() * seconds.factor + seconds.offset).matrix();
-  const std::vector<LeftOut> left_out = BadReadings(table, stamps, run).leave_out_all();
+  const std::vector<LeftOut> left_out = BadReadings(table, stamps, grid.rows, run).leave_out_all();
   for (CsvColumn& column : table.columns) {
     if (column.name == "time") continue;
     if (!column.text.empty()) {

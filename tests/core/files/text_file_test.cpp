@@ -232,7 +232,9 @@ TEST(Together, ASignalDoesNotPartThem) {
     EXPECT_TRUE(WIFSIGNALED(status));
     const bool one = fs::exists(first), other = fs::exists(second);  // the first child may not have come so far
     ASSERT_EQ(one, other) << k;
-    if (one) ASSERT_EQ(read_text(first), read_text(second)) << k;
+    if (one) {
+      ASSERT_EQ(read_text(first), read_text(second)) << k;
+    }
   }
   EXPECT_TRUE(fs::exists(first)) << "otherwise this has tested nothing";
 }

@@ -50,7 +50,7 @@ TEST(Fingerprint, ColumnsThatNothingReadsDoNotCount) {
   EXPECT_EQ(fingerprint(warmer, rig), fingerprint(run, rig));
   EXPECT_EQ(fingerprint(run, rig), fingerprint(run)) << "as an earlier version wrote it";
   Rig with_sensor = rig;
-  with_sensor.sensors.push_back({"temperature"});
+  with_sensor.sensors.push_back({.column = "temperature", .unit = {}});
   EXPECT_NE(fingerprint(warmer, with_sensor), fingerprint(run, with_sensor));
 }
 
@@ -73,7 +73,7 @@ TEST(Fingerprint, OfARigKnowsEveryNumberOfItsModel) {
   EXPECT_EQ(differs([](Rig& r) { r.torsion.flexibility(0, 0) *= 1.0001; }), Parts{"torsion"});
   EXPECT_EQ(differs([](Rig& r) { r.strip_length *= 1.0001; }), Parts{"submerged"});
   EXPECT_EQ(differs([](Rig& r) { r.gauge_filters.push_back(first_order_low_pass(30)); }), Parts{"gauge"});
-  EXPECT_EQ(differs([](Rig& r) { r.sensors.push_back({"heave"}); }), Parts{"sensors"});
+  EXPECT_EQ(differs([](Rig& r) { r.sensors.push_back({.column = "heave", .unit = {}}); }), Parts{"sensors"});
   EXPECT_EQ(differs([](Rig& r) { r.normal.modes += 1; }), Parts{"modes"});
   for (const auto& change : std::vector<void (*)(Rig&)>{[](Rig& r) { r.rigid_from -= 1; }, [](Rig& r) { r.submerged.pop_back(); }, [](Rig& r) { r.gauge_element += 1; }, [](Rig& r) { r.calibration_element -= 1; }})
     EXPECT_EQ(differs(change), Parts{"structure"});
