@@ -138,6 +138,7 @@ FitResult describe_fit(Arrival& arrival, const FitProblem& problem, Settle first
     result.variables += run.is_aside() ? 0 : run.linear_unknowns();
     result.runs.push_back(describe_run(run, joint.theta(r), run.is_aside() ? run.evaluate(joint.theta(r), Partials::none).chi2 : lin.run_chi2[r]));
   }
+  result.noise_colour = noise_colours(joint);
   describe_parameters(joint, uncertainty, problem.start, result);
   if (inexact) inexact->describe(joint, with_numbers, result);
   if (inexact && !problem.profile.empty()) {

@@ -8,6 +8,7 @@
 #include "core/rig/rig.h"
 #include "core/run/run.h"
 #include "core/model/wagner.h"
+#include "fit/likelihood/noise_colour.h"
 #include "fit/uncertainty/determined.h"
 #include "fit/uncertainty/profile.h"
 #include "fit/uncertainty/undetermined.h"
@@ -95,6 +96,7 @@ struct FitResult {
   std::vector<DeterminedCombination> determined;  ///< where a parameter is not; their unknowns are the first of `parameters`
   std::vector<ProfiledParameter> profiles;
   std::vector<FittedRun> runs;
+  std::vector<ChannelColour> noise_colour;  ///< of the fitted readings, where they have one (fit/likelihood/noise_colour.h)
   bool coloured = false;        ///< which of the two standard errors `std_error` is
   std::vector<std::string> effects;
   Eigen::Index law_steps = 1;   ///< nonlinear laws were followed in so many times the steps that they ask for

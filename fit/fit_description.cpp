@@ -3,7 +3,9 @@
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <numeric>
+#include <optional>
 
 #include <fmt/format.h>
 
@@ -134,6 +136,23 @@ FittedRun describe_run(const RunResidual& residual, const VectorXd& theta, doubl
     fitted.channels.back().spikes = residual.spikes();
   }
   return fitted;
+}
+
+std::vector<ChannelColour> noise_colours(const JointProblem& joint) {
+  std::map<std::string, std::vector<RestResidual>> left;
+  for (std::size_t r = 0; r < joint.runs().size(); ++r) {
+    const RunResidual& run = joint.runs()[r];
+    const RunResidual::Prediction p = run.predict(joint.theta(r));
+    for (std::size_t c = 0; c < p.channels.size() && !run.is_aside(); ++c) {
+      if (sigma_of_inputs(run, c) > 0) continue;  // coloured by what drives the rig
+      const VectorXd residual = (run.run().channel(p.channels[c]).value - p.output.col(static_cast<Index>(c))) / run.sigma(c);
+      left[p.channels[c]].push_back({run.at_rest(residual, run.channel_weight(c)), run.run().dt});
+    }
+  }
+  std::vector<ChannelColour> colours;
+  for (const auto& [channel, residuals] : left)
+    if (const std::optional<NoiseColour> colour = colour_of(residuals)) colours.push_back({channel, *colour});
+  return colours;
 }
 
 void describe_parameters(const JointProblem& joint, const ParameterUncertainty& uncertainty, const StartValues& starts, FitResult& result) {

@@ -22,6 +22,9 @@ FitResult describe_fit(Arrival& arrival, const FitProblem& problem, Settle first
 /// What a steady load before the motion reads in a run, per unit coefficient on all strips; 0 where there is none, or no gauge that shows it.
 double reading_of_steady_load(const RunResidual& residual);
 
+/// The colour that the runs' readings have in common, channel by channel, from what the fit leaves of them at rest.
+std::vector<ChannelColour> noise_colours(const JointProblem& joint);
+
 FittedRun describe_run(const RunResidual& residual, const Eigen::VectorXd& theta, double chi2);
 
 /// Standard errors and correlations of all unknowns and of the steady load of each run; what is determined where an unknown is not. The runs must have

@@ -64,6 +64,36 @@ json number(double x) { return std::isfinite(x) ? json(x) : json(nullptr); }
 template <class Named>
 std::string label(const Named& p) { return p.run.empty() ? p.name : p.name + " (" + base_name(p.run) + ")"; }
 
+/// Variances over that of the white level that the channel counts with, corners in Hz.
+void add_noise_colour(const FitResult& r, json& out) {
+  out["noise_colour"] = json::array();
+  for (const ChannelColour& one : r.noise_colour) {
+    json parts = json::array();
+    for (Eigen::Index i = 0; i < one.colour.corner.size(); ++i) parts.push_back({{"corner", one.colour.corner[i]}, {"unit", "Hz"}, {"variance", one.colour.power[i]}});
+    out["noise_colour"].push_back({{"channel", one.channel}, {"white", one.colour.white}, {"parts", parts}});
+  }
+}
+
+std::vector<ChannelColour> read_noise_colour(const json& in) {
+  std::vector<ChannelColour> all;
+  for (const json& item : in.value("noise_colour", json::array())) {
+    ChannelColour one;
+    one.channel = item.at("channel").get<std::string>();
+    one.colour.white = item.at("white").get<double>();
+    std::vector<double> corner, power;
+    for (const json& part : item.at("parts")) {
+      corner.push_back(part.at("corner").get<double>());
+      power.push_back(part.at("variance").get<double>());
+      if (!(corner.back() > 0) || !(power.back() > 0)) throw std::invalid_argument("a part of \"noise_colour\" without a positive corner and variance");
+    }
+    if (!(one.colour.white > 0)) throw std::invalid_argument("a \"noise_colour\" without white noise");
+    one.colour.corner = Eigen::Map<const Eigen::VectorXd>(corner.data(), static_cast<Eigen::Index>(corner.size()));
+    one.colour.power = Eigen::Map<const Eigen::VectorXd>(power.data(), static_cast<Eigen::Index>(power.size()));
+    all.push_back(std::move(one));
+  }
+  return all;
+}
+
 /// The numbers that stated their uncertainty, and their covariance with the parameters.
 void add_givens(const FitResult& r, json& out) {
   out["givens"] = json::array();
@@ -182,6 +212,7 @@ std::string to_json(const FitResult& r, const std::vector<std::shared_ptr<const 
     out["correlation"].push_back(row);
   }
   if (!r.givens.empty()) add_givens(r, out);
+  if (!r.noise_colour.empty()) add_noise_colour(r, out);
   out["runs"] = json::array();
   for (const FittedRun& run : r.runs) {
     json channels = json::array();
@@ -259,6 +290,7 @@ FittedRig read_fit(const json& in, const std::string& path) {
         }
     }
     if (in.contains("givens")) read_givens(in, fit);
+    fit.noise_colour = read_noise_colour(in);
     for (const json& run : in.value("runs", json::array())) {
       fit.runs.push_back(run.value("file", ""));
       fit.fingerprints.push_back(run.value("fingerprint", ""));
@@ -398,6 +430,11 @@ std::string report(const FitResult& r, double least) {
   line("Akaike info crit", fmt::format("{:.2f}", r.aic()));
   line("Bayesian info crit", fmt::format("{:.2f}", r.bic()));
   line("standard errors", r.coloured ? "residuals coloured: from their own spectra (for white ones in brackets)" : "residuals white");
+  for (const ChannelColour& one : r.noise_colour) {
+    std::string corners;
+    for (const double corner : one.colour.corner) corners += fmt::format("{}{:.2g}", corners.empty() ? "" : ", ", corner);
+    line("noise colour", fmt::format("{}: {:.2g} % of its variance in parts that are correlated, with corners at {} Hz", one.channel, 100 * one.colour.power.sum() / one.colour.variance(), corners));
+  }
   if (!r.no_answer.empty()) text += "    NO TRUSTWORTHY ANSWER: " + r.no_answer + "\n";
 
   std::size_t width = 0;

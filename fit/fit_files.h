@@ -23,6 +23,7 @@ struct FittedRig {
   Eigen::Index law_steps = 1;        ///< FitResult::law_steps
   std::vector<FittedParameter> parameters;
   Eigen::MatrixXd correlation;
+  std::vector<ChannelColour> noise_colour;  ///< FitResult::noise_colour
   std::vector<FittedGiven> givens;     ///< numbers that stated their uncertainty, as they came out
   Eigen::MatrixXd joint_covariance;    ///< of `parameters`, then `givens`; empty without givens
   std::vector<std::string> runs;

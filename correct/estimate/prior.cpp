@@ -176,6 +176,20 @@ Search minimise(const Searched& run, Prior prior, const VectorXd& theta, double 
   return search;
 }
 
+double minus_twice_log_evidence(const RunResidual& residual, const Search& search) {
+  const Prior& prior = search.prior;
+  const VectorXd& theta = search.solution.theta;
+  const auto twice_log = [](const MatrixXd& triangle) {
+    double sum = 0;
+    for (const double d : triangle.diagonal())
+      if (d != 0) sum += 2 * std::log(std::abs(d));
+    return sum;
+  };
+  const MatrixXd rows = linear_model(search.evaluation, prior, theta).second, regularisation = prior.regularisation();
+  const MatrixXd of_theta = Eigen::HouseholderQR<MatrixXd>(rows(Eigen::all, prior.free)).matrixQR().topRows(static_cast<Index>(prior.free.size()));
+  return cost(search.solution.chi2, prior, theta) + twice_log(search.evaluation.linear_factor) + twice_log(of_theta) - twice_log(regularisation(Eigen::all, prior.amplitudes)) - 2 * residual.log_noise_density();
+}
+
 Evidence evidence(const RunResidual::Evaluation& e, const Prior& prior, const VectorXd& theta) {
   constexpr double least = 0.01, most = 10, settled = 1e-3;
   const auto count = static_cast<Index>(prior.free.size());

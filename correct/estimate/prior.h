@@ -69,6 +69,9 @@ struct Search {
   double determined = 0;               ///< amplitudes, by the data
 };
 
+/// -2 log of the evidence, the probability of the readings with theta and all that enters linearly integrated out (Laplace), but for what does not depend on the noise's colour.
+double minus_twice_log_evidence(const RunResidual& residual, const Search& search);
+
 /// What a search asks of a run: the least chi-square at a theta, with all that enters linearly at its best, and its slopes there. `advance`: where a step leads that may be bent, as
 /// long as its beginning is straight; none: straight on.
 struct Searched {

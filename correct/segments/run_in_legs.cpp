@@ -214,6 +214,19 @@ void RunInLegs::learn_noise_and_motion(const VectorXd& theta) {
   evaluations_.clear();
 }
 
+RunInLegs RunInLegs::with_colours(const VectorXd& theta, const RunResidual::Colours& colours) const {
+  RunInLegs other = *this;
+  Leg& leg = other.legs_.front();
+  const MatrixXd of_motion = leg.motion_prior.leftCols(leg.residual->motion().unknowns());
+  leg.residual->set_colours(theta, colours);
+  leg.motion_prior = MatrixXd::Zero(of_motion.rows(), leg.residual->linear_unknowns());
+  leg.motion_prior.leftCols(of_motion.cols()) = of_motion;
+  leg.residual->set_motion_prior(leg.motion_prior);
+  other.solutions_.clear();
+  other.evaluations_.clear();
+  return other;
+}
+
 Index RunInLegs::degrees_of_freedom() const {
   Index sum = 0;
   for (const Leg& leg : legs_) sum += leg.residual->degrees_of_freedom() + leg.motion_prior.rows();

@@ -42,6 +42,8 @@ class RunInLegs {
   void differentiate_only(const std::vector<Eigen::Index>& parameters);
   /// Noise of each leg from what the model at theta leaves of it, spikes left out, and the prior of its motion from then on (fit/likelihood/motion_prior.h).
   void learn_noise_and_motion(const Eigen::VectorXd& theta);
+  /// The same run, in one leg and with white noise so far, with these colours of it (RunResidual::set_colours).
+  RunInLegs with_colours(const Eigen::VectorXd& theta, const RunResidual::Colours& colours) const;
 
   std::size_t size() const { return legs_.size(); }
   const Interval& samples(std::size_t leg) const { return legs_[leg].samples; }

@@ -76,7 +76,10 @@ MatrixXd RunResidual::Linearised::white(const RunResidual& run, const MatrixXd& 
 MatrixXd RunResidual::Linearised::standardised(const RunResidual& run, const MatrixXd& left) {
   const MatrixXd there = (run.weight_.array() > 0 && left.array().isFinite()).select(left, 0.0);
   if (const InputNoise* noise = input_noise(run)) return MatrixXd(noise->whitened(there.reshaped())).reshaped(left.rows(), left.cols());
-  return run.tempered_ * run.weight_.cwiseProduct(there);
+  MatrixXd white = there;
+  for (std::size_t c = 0, f = 0; c < run.colour_.size(); ++c)
+    if (run.colour_[c]) white.col(static_cast<Index>(c)) = run.filters_[f++].filtered(there.col(static_cast<Index>(c)));
+  return run.tempered_ * run.weight_.cwiseProduct(white);
 }
 
 void RunResidual::Linearised::whiten(const RunResidual& run, Sensitivity& s) {

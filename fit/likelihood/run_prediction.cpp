@@ -30,15 +30,18 @@ RunResidual::Prediction RunResidual::predict(const VectorXd& theta) const {
     p.output.rowwise() += p.offset.transpose();
     return p;
   }
-  DualMatrix state(MatrixXd::Zero(lin.system.states(), 1));
-  state.value.col(0) = initial_state(p.linear, lin.system.states());
-  const FreeResponse free(lin.system, lin.step, Partials::none);
+  // The readings themselves, not behind the filters.
+  LinearSystem system = filters_.empty() ? lin.system : searched_system(theta);
+  const ExactStep step = filters_.empty() ? lin.step : exact_step(system, run_->dt);
+  DualMatrix state(MatrixXd::Zero(system.states(), 1));
+  state.value.col(0) = initial_state(p.linear, system.states());
+  const FreeResponse free(system, step, Partials::none);
   for (const MotionBasis::Phase& phase : phases_) {
     const Interval& s = phase.samples;
-    const Response response = phase.moving ? drive(lin.system, lin.step, state, s.length(), p.motion.jerk.segment(s.first, s.length()), {}, Partials::none)
+    const Response response = phase.moving ? drive(system, step, state, s.length(), p.motion.jerk.segment(s.first, s.length()), {}, Partials::none)
                                              : free.from(state, s.length());
     state = response.end;
-    if (phase.moving && s.last < run_->samples()) stand_still(state.value, lin.system.motion, Eigen::RowVectorXd::Constant(1, p.motion.angle[s.last] + arrival_angle(lin.system)));
+    if (phase.moving && s.last < run_->samples()) stand_still(state.value, system.motion, Eigen::RowVectorXd::Constant(1, p.motion.angle[s.last] + arrival_angle(system)));
     p.output.middleRows(s.first, s.length()) = response.output;
   }
   if (lin.known.size() > 0) p.output += lin.known;
@@ -91,7 +94,7 @@ RunResidual::Sensitivity RunResidual::sensitivity(const VectorXd& theta) const {
   if (coloured) Linearised::whiten(*this, result);
   for (Index c = 0; c < measured_.cols() && !coloured; ++c) {
     Sensitivity::PerChannel& channel = result.channels[static_cast<std::size_t>(c)];
-    channel.residual = weight_.col(c).cwiseProduct(channel.residual + measured_.col(c));
+    channel.residual = weight_.col(c).cwiseProduct(channel.residual + readings().col(c));
     channel.slope.array().colwise() *= weight_.col(c).array();
   }
   if (angle_offset_ >= 0) {

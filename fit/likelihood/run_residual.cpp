@@ -172,11 +172,18 @@ RunResidual::RunResidual(const AeroelasticModel& model, const Run& run, std::vec
     free_.insert(free_.end(), system.settling.begin(), system.settling.end());
   }
   free_.insert(free_.end(), system.exogenous.begin(), system.exogenous.end());
+  states_ = system.states();
+  lay_out();
+}
+
+/// Where in c each kind of unknown begins.
+void RunResidual::lay_out() {
   first_state_ = motion_.unknowns();
   first_offset_ = first_state_ + static_cast<Index>(free_.size());
   unknowns_ = first_offset_ + static_cast<Index>(channels_.size());
   if (conditions_.prescribed_pitch) angle_offset_ = unknowns_++;
-  prepare_angle_rows();
+  motion_prior_.resize(0, 0);
+  weights_changed();
 }
 
 Index RunResidual::observations() const {
@@ -191,6 +198,7 @@ void RunResidual::prepare_angle_rows() {
   forget_solutions();
   angle_rows_.clear();
   if (motion_prior_.rows() > 0) angle_rows_.push_back(motion_prior_);
+  add_colour_rows();
   if (angle_offset_ < 0) return;
   for (const MotionBasis::Phase& phase : phases_) {
     const Interval& s = phase.samples;
@@ -263,6 +271,7 @@ void RunResidual::keep_noise_of(const RunResidual& other) {
   sigma_ = other.sigma_;
   weight_ = other.weight_;
   Linearised::keep_input_noise(*this, other);
+  take_colour(other);
   angle_sigma_ = other.angle_sigma_;
   angle_ = other.angle_;
   angle_weight_ = other.angle_weight_;
@@ -310,10 +319,11 @@ void RunResidual::settle_noise(const VectorXd& theta) {
   };
   for (std::size_t c = 0; c < channels_.size(); ++c) {
     const auto column = static_cast<Index>(c);
+    if (colour(c)) continue;  // has its own level
     settle(channels_[c], measured_.col(column) - p.output.col(column), weight_.col(column), sigma_[c]);
   }
   if (angle_offset_ >= 0) settle("alpha", angle_ - p.motion.angle - VectorXd::Constant(angle_.size(), p.angle_offset[0]), angle_weight_, angle_sigma_);
-  if (p.output.allFinite()) Linearised::settle_input_noise(*this, theta, measured_ - p.output);
+  if (p.output.allFinite() && filters_.empty()) Linearised::settle_input_noise(*this, theta, measured_ - p.output);
   weights_changed();
 }
 

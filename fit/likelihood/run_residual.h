@@ -1,5 +1,6 @@
 #pragma once
 #include <Eigen/Core>
+#include <cmath>
 #include <functional>
 #include <map>
 #include <memory>
@@ -12,6 +13,7 @@
 #include "core/run/motion.h"
 #include "core/propagate/response.h"
 #include "core/run/run.h"
+#include "fit/likelihood/noise_colour.h"
 #include "fit/likelihood/rest_rows.h"
 
 namespace unrig {
@@ -166,11 +168,28 @@ class RunResidual {
   /// efficient), unless those of third order are smaller by more than chance.
   void settle_noise(const Eigen::VectorXd& theta);
 
+  /// Whether a colour can be set: of linear models that are driven by nothing measured and go on from no other part.
+  bool may_be_coloured(const Eigen::VectorXd& theta) const;
+  using Colours = std::vector<std::optional<NoiseColour>>;
+  /// The colour of each channel's noise in what the model at theta leaves of it at rest (fit/likelihood/noise_colour.h); where others have shown what to expect, that in this run's size.
+  Colours colours(const Eigen::VectorXd& theta, const std::vector<ChannelColour>& expected) const;
+  /// Readings and model are compared behind the filter that makes such noise white from then on; its state at the first sample joins c. The prior on the motion goes away. Of a run whose
+  /// noise was white so far. Left-out readings are filled by what the model at theta says.
+  void set_colours(const Eigen::VectorXd& theta, const Colours& colours);
+  /// Logarithm of the density of the readings' noise where all innovations are 0, and of the noise's own state at the first sample, but for constants.
+  double log_noise_density() const;
+  /// What is left of a channel at rest; elsewhere, and where a reading does not count, not a number. Knots as close as samples take the noise while the shaft moves.
+  Eigen::VectorXd at_rest(Eigen::VectorXd left, const Eigen::VectorXd& weight) const;
+  /// Root mean square of a channel's noise of all colours [SI].
+  double noise(std::size_t channel) const { return colour_.empty() || !colour_[channel] ? sigma_[channel] : std::sqrt(colour_[channel]->variance()); }
+  /// The colour of a channel's noise; null where it is white.
+  const NoiseColour* colour(std::size_t channel) const { return colour_.empty() || !colour_[channel] ? nullptr : &*colour_[channel]; }
+
   /// All readings but the angle's as if their scale were another.
   void scale_readings(double factor) {
     measured_ *= factor;
-    smooth_readings_.clear();
-    forget_solutions();
+    whitened_ *= factor;
+    weights_changed();
   }
 
   /// Lets every fitted channel count as if its noise were `factor` times what it is; replaces an earlier factor. While physics is missing, runs that it is far from
@@ -216,6 +235,11 @@ class RunResidual {
  private:
   std::shared_ptr<Linearised> linearise(const Eigen::VectorXd& theta) const;
   void weights_changed();
+  void lay_out();
+  void take_colour(const RunResidual& other);
+  void add_colour_rows();
+  void filter_output(LinearSystem& system, ExactStep& step) const;
+  const Eigen::MatrixXd& readings() const { return whitened_.size() > 0 ? whitened_ : measured_; }
   void forget_solutions() {
     last_solution_ = {};
     last_evaluation_ = {};
@@ -268,6 +292,9 @@ class RunResidual {
   Eigen::MatrixXd measured_;  ///< samples x channels, missing samples 0
   Eigen::MatrixXd weight_;    ///< 1 / sigma, 0 where left out
   std::vector<double> sigma_;
+  std::vector<std::optional<NoiseColour>> colour_;  ///< by channel; empty: all are white
+  std::vector<WhiteningFilter> filters_;            ///< of the coloured channels, in turn
+  Eigen::MatrixXd whitened_;                        ///< measured_ behind the filters, empty without
   double tempered_ = 1;
   bool from_afar_ = false, thorough_ = false, aside_ = false;
   Eigen::VectorXd angle_, angle_weight_;
@@ -301,6 +328,7 @@ class RunResidual {
   Eigen::Index finer_ = 1;
 
   // Layout of c.
+  Eigen::Index states_ = 0;         ///< of the model; those of the filters stand behind them
   std::vector<Eigen::Index> free_;  ///< states whose initial value is unknown
   Eigen::Index unknowns_ = 0;
   Eigen::Index first_state_ = 0, first_offset_ = 0, angle_offset_ = -1;

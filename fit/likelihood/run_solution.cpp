@@ -19,7 +19,8 @@ using run_rows::stacked;
 
 VectorXd RunResidual::initial_state(const VectorXd& linear, Index states) const {
   VectorXd state = VectorXd::Zero(states);
-  for (std::size_t i = 0; i < free_.size(); ++i) state[free_[i]] = linear[first_state_ + static_cast<Index>(i)];
+  for (std::size_t i = 0; i < free_.size(); ++i)
+    if (free_[i] < states) state[free_[i]] = linear[first_state_ + static_cast<Index>(i)];
   if (arrival_.rows() > 0) state += arrival_.value.col(0);
   return state;
 }
@@ -45,6 +46,7 @@ std::shared_ptr<RunResidual::Linearised> RunResidual::linearise(const VectorXd& 
     lin->system = searched_system(theta);
     for (DualMatrix* m : {&lin->system.A, &lin->system.B, &lin->system.C, &lin->system.D}) m->partial.clear();
     lin->step = step_to_follow(lin->system, run_->dt);
+    filter_output(lin->system, lin->step);
   }
   if (!lin->system.feedback.empty()) return lin;
   prepare_linear(*lin);
@@ -195,7 +197,7 @@ run_rows::Rotated RunResidual::rotated_readings(const Linearised& lin, const run
       beside += readings.beside;
       continue;
     }
-    VectorXd y = measured_.col(block.channel).segment(first, stretch.length());
+    VectorXd y = readings().col(block.channel).segment(first, stretch.length());
     if (lin.known.size() > 0) y -= lin.known.col(block.channel).segment(first, stretch.length());
     block.rotate(stretch, weight_.col(block.channel).segment(first, stretch.length()).cwiseProduct(y), rotated);
   }
@@ -208,7 +210,7 @@ const rest_rows::SmoothReadings& RunResidual::smooth_readings(Index channel, con
   const auto known = smooth_readings_.find(key);
   if (known != smooth_readings_.end()) return known->second;
   return smooth_readings_
-      .emplace(key, rest_rows::smooth_readings(weight_.col(channel).segment(stretch.first, stretch.length()), measured_.col(channel).segment(stretch.first, stretch.length())))
+      .emplace(key, rest_rows::smooth_readings(weight_.col(channel).segment(stretch.first, stretch.length()), readings().col(channel).segment(stretch.first, stretch.length())))
       .first->second;
 }
 
@@ -314,6 +316,7 @@ DualMatrix RunResidual::follow_partials(const VectorXd& theta, const VectorXd& l
       return {};
     }
     ExactStep step = exact_step(system, run_->dt);
+    filter_output(system, step);
     FreeResponse free(system, step, Partials::all);
     std::optional<rest_rows::SmoothResponse> smooth;
     if (shared_ || std::any_of(blocks.begin(), blocks.end(), [](const run_rows::Block& block) { return !block.moving && block.smooth_from < block.samples.last; })) smooth.emplace(free);
@@ -398,7 +401,7 @@ RunResidual::Evaluation RunResidual::differentiate(const Solution& solution) con
       m.col(parameters) += readings.reading;
       beside += readings.beside;
     } else {
-      m.col(parameters) += measured_.col(block.channel).segment(s.first, s.length());
+      m.col(parameters) += readings().col(block.channel).segment(s.first, s.length());
       m = weight_.col(block.channel).segment(s.first, s.length()).asDiagonal() * m;
     }
     block.rotate(s, std::move(m), rotated_blocks[b]);

@@ -156,7 +156,8 @@ TEST(QuadraticDrag, IsFoundInALiquidAndRefusedWhereThereIsNone) {
   constexpr double truth = 4.8;
   FitProblem problem;
   problem.rig = rig;
-  problem.runs = {decay_with_drag(rig, 998.2, truth)};
+  problem.runs = {decay_with_drag(rig, 998.2, truth), decay_with_drag(rig, 1.2, truth)};  // one alone hardly tells stiffness from apparent mass, nor drag from both
+  problem.runs.back().file = "dry.csv";
   problem.effects = {"quadratic-drag"};
   const FitResult result = fit(problem);
   const FittedParameter& drag = parameter(result, "quadratic-drag.coefficient");
@@ -164,7 +165,7 @@ TEST(QuadraticDrag, IsFoundInALiquidAndRefusedWhereThereIsNone) {
   EXPECT_NEAR(drag.value, truth, 4 * drag.std_error);
   EXPECT_LT(drag.std_error, 0.2 * truth) << "otherwise this says nothing";
   for (const double density : {0.0, 1.2}) {
-    problem.runs.front().density = density;
+    for (unrig::Run& run : problem.runs) run.density = density;
     try {
       fit(problem);
       FAIL() << "nothing to be dragged through";

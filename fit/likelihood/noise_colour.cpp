@@ -1,0 +1,285 @@
+#include "fit/likelihood/noise_colour.h"
+
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+#include <cmath>
+#include <iterator>
+#include <numbers>
+#include <utility>
+
+#include "core/numerics/spectrum.h"
+#include "core/run/motion.h"
+
+namespace unrig {
+namespace {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+constexpr Index shortest_stretch = 64;
+
+/// Stretches without left-out samples.
+std::vector<Interval> stretches_of(const VectorXd& residual) {
+  std::vector<Interval> stretches;
+  for (Index k = 0; k < residual.size();) {
+    const Index first = k;
+    while (k < residual.size() && std::isfinite(residual[k])) ++k;
+    if (k - first >= shortest_stretch) stretches.push_back({first, k});
+    while (k < residual.size() && !std::isfinite(residual[k])) ++k;
+  }
+  return stretches;
+}
+
+/// Corners a factor of four apart, from an eighth of the sampling rate down to what the longest stretch still tells from a constant.
+VectorXd corners_for(double rate, double duration) {
+  constexpr double apart = 4, slowest = 0.5;  // periods of the corner in the stretch
+  std::vector<double> corners;
+  for (double corner = rate / 8; corner * duration > slowest; corner /= apart) corners.push_back(corner);
+  return Eigen::Map<const VectorXd>(corners.data(), static_cast<Index>(corners.size()));
+}
+
+VectorXd poles(const VectorXd& corner, double dt) { return (-2 * std::numbers::pi * dt * corner.array()).exp(); }
+
+/// Expected periodogram over n samples of a part of unit variance, on the lines between the mean and the last: the transform of its covariance under the triangle of what the samples have in
+/// common (A. M. Sykulski et al., Biometrika 106 (2019) 251).
+VectorXd expected_periodogram(double pole, Index n) {
+  VectorXd covariance(n);
+  double correlation = 1;
+  for (Index lag = 0; lag < n; ++lag, correlation *= pole) covariance[lag] = (1 - static_cast<double>(lag) / static_cast<double>(n)) * correlation;
+  return (2 * fourier(covariance).real().array() - 1).segment(1, (n - 1) / 2);
+}
+
+/// Means over groups of neighbouring lines, ever longer ones: the spectra change little over them.
+VectorXd grouped(const VectorXd& lines, VectorXd* counts = nullptr) {
+  constexpr double wider = 1.0 / 32;
+  std::vector<double> means, lengths;
+  for (Index k = 0; k < lines.size();) {
+    const Index length = std::min<Index>(lines.size() - k, 1 + static_cast<Index>(wider * static_cast<double>(k)));
+    means.push_back(lines.segment(k, length).mean());
+    lengths.push_back(static_cast<double>(length));
+    k += length;
+  }
+  if (counts) *counts = Eigen::Map<const VectorXd>(lengths.data(), static_cast<Index>(lengths.size()));
+  return Eigen::Map<const VectorXd>(means.data(), static_cast<Index>(means.size()));
+}
+
+/// The periodogram of a stretch beside those that white noise (first column) and the parts of a colour lead to, each of unit variance.
+struct Stretch {
+  VectorXd power;
+  MatrixXd basis;
+};
+
+std::vector<Stretch> periodograms(const RestResidual& residual, const VectorXd& corner) {
+  std::vector<Stretch> all;
+  for (const Interval& s : stretches_of(residual.value)) {
+    const Index n = s.length(), lines = (n - 1) / 2;
+    Stretch stretch{fourier(VectorXd(residual.value.segment(s.first, n))).cwiseAbs2().segment(1, lines) / static_cast<double>(n), MatrixXd::Ones(lines, corner.size() + 1)};
+    const VectorXd pole = poles(corner, residual.dt);
+    for (Index i = 0; i < corner.size(); ++i) stretch.basis.col(i + 1) = expected_periodogram(pole[i], n);
+    all.push_back(std::move(stretch));
+  }
+  return all;
+}
+
+/// Groups of lines of all stretches, one after the other.
+struct Groups {
+  VectorXd count, power;
+  MatrixXd basis;
+
+  explicit Groups(const std::vector<Stretch>& stretches) {
+    std::vector<VectorXd> counts(stretches.size());
+    std::vector<VectorXd> powers;
+    Index rows = 0;
+    for (std::size_t i = 0; i < stretches.size(); ++i) {
+      powers.push_back(grouped(stretches[i].power, &counts[i]));
+      rows += counts[i].size();
+    }
+    count.resize(rows), power.resize(rows), basis.resize(rows, stretches.empty() ? 0 : stretches.front().basis.cols());
+    Index at = 0;
+    for (std::size_t i = 0; i < stretches.size(); at += counts[i].size(), ++i) {
+      count.segment(at, counts[i].size()) = counts[i];
+      power.segment(at, counts[i].size()) = powers[i];
+      for (Index j = 0; j < basis.cols(); ++j) basis.col(j).segment(at, counts[i].size()) = grouped(stretches[i].basis.col(j));
+    }
+  }
+  /// Whittle's.
+  double log_likelihood(const VectorXd& spectrum) const { return -(count.array() * (spectrum.array().log() + power.array() / spectrum.array())).sum(); }
+  /// The size of a spectrum of this shape that is most likely.
+  double size(const VectorXd& shape) const { return count.dot(power.cwiseQuotient(shape)) / count.sum(); }
+  VectorXd white() const { return VectorXd::Constant(power.size(), size(VectorXd::Ones(power.size()))); }
+};
+
+/// Powers of the columns of the basis with the greatest likelihood.
+VectorXd most_likely_powers(const Groups& lines) {
+  constexpr int most = 3000;
+  constexpr double precise = 1e-3;  // of the logarithm, over ten steps
+  VectorXd powers = VectorXd::Constant(lines.basis.cols(), lines.white()[0] / static_cast<double>(lines.basis.cols()));
+  double before = -INFINITY;
+  for (int i = 0; i < most; ++i) {
+    const VectorXd spectrum = lines.basis * powers, weight = lines.count.cwiseQuotient(spectrum);
+    if (i % 10 == 0) {
+      const double now = lines.log_likelihood(spectrum);
+      if (now - before < precise) break;
+      before = now;
+    }
+    const VectorXd pull = lines.basis.transpose() * weight.cwiseProduct(lines.power).cwiseQuotient(spectrum), push = lines.basis.transpose() * weight;
+    powers = powers.cwiseProduct(pull.cwiseQuotient(push));
+  }
+  return powers;
+}
+
+/// The value that chi-square with n degrees of freedom exceeds once in a thousand (E. B. Wilson and M. M. Hilferty, PNAS 17 (1931) 684).
+double once_in_a_thousand(double n) {
+  constexpr double normal = 3.0902;
+  const double spread = 2 / (9 * n);
+  return n * std::pow(1 - spread + normal * std::sqrt(spread), 3);
+}
+
+/// Bartlett's test of the cumulative periodogram: whether lines in units of their spectrum are those of white noise, but once in a thousand.
+bool is_white(const VectorXd& relative) {
+  constexpr double once_in_a_thousand_of_kolmogorov = 1.9495;
+  const auto count = static_cast<double>(relative.size());
+  const double total = relative.sum();
+  double sum = 0, distance = 0;
+  for (Index k = 0; k < relative.size(); ++k) {
+    sum += relative[k];
+    distance = std::max(distance, std::abs(sum / total - static_cast<double>(k + 1) / count));
+  }
+  return std::sqrt(count) * distance < once_in_a_thousand_of_kolmogorov;
+}
+
+}  // namespace
+
+namespace {
+
+bool leaves_white(const std::vector<Stretch>& stretches, const VectorXd& powers) {
+  return std::all_of(stretches.begin(), stretches.end(), [&](const Stretch& s) { return is_white(s.power.cwiseQuotient(s.basis * powers)); });
+}
+
+/// The parts that matter.
+NoiseColour colour_from(const VectorXd& corner, const VectorXd& powers) {
+  constexpr double least = 1e-6;  // of the whole
+  NoiseColour colour;
+  colour.white = std::max(powers[0], least * powers.sum());
+  std::vector<Index> counts;
+  for (Index i = 0; i < corner.size(); ++i)
+    if (powers[i + 1] > least * powers.sum()) counts.push_back(i);
+  colour.corner = corner(counts);
+  colour.power = VectorXd(powers.tail(corner.size()))(counts);
+  return colour;
+}
+
+struct Longest {
+  double duration = 0, dt = 0;
+};
+
+Longest longest_stretch(const std::vector<RestResidual>& residuals) {
+  Longest longest;
+  for (const RestResidual& r : residuals)
+    for (const Interval& s : stretches_of(r.value))
+      if (const double duration = static_cast<double>(s.length()) * r.dt; duration > longest.duration) longest = {duration, r.dt};
+  return longest;
+}
+
+}  // namespace
+
+std::optional<NoiseColour> colour_of(const std::vector<RestResidual>& residuals) {
+  const Longest longest = longest_stretch(residuals);
+  if (!(longest.duration > 0)) return std::nullopt;
+  const VectorXd corner = corners_for(1 / longest.dt, longest.duration);
+  std::vector<Stretch> stretches;
+  double of_white = 0;
+  for (const RestResidual& r : residuals) {
+    std::vector<Stretch> own = periodograms(r, corner);
+    if (own.empty()) continue;
+    const Groups groups(own);
+    if (!(groups.white()[0] > 0)) return std::nullopt;
+    of_white += groups.log_likelihood(groups.white());
+    std::move(own.begin(), own.end(), std::back_inserter(stretches));
+  }
+  const Groups lines(stretches);
+  const VectorXd powers = most_likely_powers(lines);
+  const double gained = 2 * (lines.log_likelihood(lines.basis * powers) - of_white);
+  if (gained < once_in_a_thousand(static_cast<double>(corner.size())) || !leaves_white(stretches, powers)) return std::nullopt;
+  return colour_from(corner, powers);
+}
+
+std::optional<NoiseColour> sized(const NoiseColour& colour, const RestResidual& residual) {
+  const std::vector<Stretch> stretches = periodograms(residual, colour.corner);
+  if (stretches.empty()) return std::nullopt;
+  VectorXd powers(1 + colour.power.size());
+  powers << colour.white, colour.power;
+  const Groups lines(stretches);
+  return colour_from(colour.corner, lines.size(lines.basis * powers) * powers);
+}
+
+WhiteningFilter::WhiteningFilter(const NoiseColour& colour, double dt) : pole_(poles(colour.corner, dt)) {
+  const Index m = pole_.size();
+  const VectorXd drive = colour.power.array() * (1 - pole_.array().square());
+  const MatrixXd stationary = colour.power.asDiagonal();
+  MatrixXd known = stationary;  // covariance of the parts before each sample, given those before it
+  double innovation = 0;
+  constexpr double settled = 1e-13;
+  constexpr int most = 1000000;
+  for (int i = 0; i < most; ++i) {
+    const VectorXd reach = known.rowwise().sum();
+    innovation = reach.sum() + colour.white;
+    MatrixXd next = pole_.asDiagonal() * (known - reach * reach.transpose() / innovation) * pole_.asDiagonal();
+    next.diagonal() += drive;
+    const bool done = (next - known).norm() <= settled * next.norm();
+    known = 0.5 * (next + next.transpose());
+    if (done) break;
+  }
+  gain_ = pole_.cwiseProduct(known.rowwise().sum()) / innovation;
+  feed_ = -gain_ * VectorXd::Ones(m).transpose();
+  feed_.diagonal() += pole_;
+  g_ = 1 + (gain_.array() / (1 - pole_.array())).sum();
+  sigma_ = g_ * std::sqrt(innovation);
+  unknown_ = stationary - known;
+}
+
+VectorXd WhiteningFilter::settled() const { return (MatrixXd::Identity(states(), states()) - feed_).partialPivLu().solve(gain_); }
+
+VectorXd WhiteningFilter::filtered(const VectorXd& readings) const {
+  VectorXd white(readings.size()), state = settled() * readings[0];
+  for (Index k = 0; k < readings.size(); ++k) {
+    const double innovation = readings[k] - state.sum();
+    white[k] = g_ * innovation;
+    state = pole_.cwiseProduct(state) + gain_ * innovation;
+  }
+  return white;
+}
+
+MatrixXd WhiteningFilter::start_information() const {
+  const Eigen::SelfAdjointEigenSolver<MatrixXd> parts(unknown_);
+  constexpr double rounding = 1e-10;
+  const VectorXd variance = parts.eigenvalues().cwiseMax(rounding * unknown_.diagonal().maxCoeff());
+  return variance.cwiseSqrt().cwiseInverse().asDiagonal() * parts.eigenvectors().transpose();
+}
+
+void WhiteningFilter::append(Index channel, LinearSystem& system, ExactStep& step) const {
+  const Index n = step.transition.rows(), m = states(), channels = system.C.rows();
+  const DualMatrix row = system.C.block(channel, 0, 1, n);
+  const MatrixXd gain = gain_, all = Eigen::RowVectorXd::Ones(m);
+  step.transition = step.transition.grown(n + m, n + m);
+  step.transition.set_block(n, 0, gain * row);
+  step.transition.set_block(n, n, feed_);
+  if (step.jerk.rows() > 0) step.jerk = step.jerk.grown(n + m, step.jerk.cols());
+  const bool at_once = system.D.cols() > 0;
+  for (DualMatrix* input : {&step.input0, &step.input1})
+    if (input->rows() > 0 || at_once) *input = input->grown(n + m, input->cols());
+  if (at_once) {
+    const DualMatrix through = system.D.block(channel, 0, 1, system.D.cols());
+    step.input0.set_block(n, 0, gain * through);
+    system.D.set_block(channel, 0, g_ * through);
+  }
+  DualMatrix observe = system.C.grown(channels, n + m);
+  observe.set_block(channel, 0, g_ * row);
+  observe.set_block(channel, n, MatrixXd(-g_ * all));
+  system.C = std::move(observe);
+  system.A = system.A.grown(n + m, n + m);
+  system.B = system.B.grown(n + m, system.B.cols());
+}
+
+}  // namespace unrig

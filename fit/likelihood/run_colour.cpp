@@ -1,0 +1,109 @@
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+
+#include "fit/likelihood/noise_colour.h"
+#include "fit/likelihood/run_linearised.h"
+
+// RunResidual where the noise of a channel has a colour: model and readings pass the same whitening filter, and all that is exact for white noise holds behind it.
+
+namespace unrig {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+VectorXd RunResidual::at_rest(VectorXd left, const VectorXd& weight) const {
+  for (Index k = 0; k < left.size(); ++k)
+    if (!(weight[k] > 0)) left[k] = std::nan("");
+  for (const MotionBasis::Phase& phase : phases_)
+    if (phase.moving) left.segment(phase.samples.first, phase.samples.length()).setConstant(std::nan(""));
+  return left;
+}
+bool RunResidual::may_be_coloured(const VectorXd& theta) const {
+  const bool goes_on = arrival_.rows() > 0, driven = inputs_.cols() > 0;
+  return !goes_on && !driven && model_->system(conditions_, theta, channels_).feedback.empty();
+}
+
+RunResidual::Colours RunResidual::colours(const VectorXd& theta, const std::vector<ChannelColour>& expected) const {
+  const Prediction p = predict(theta);
+  Colours found;
+  for (Index c = 0; c < measured_.cols(); ++c) {
+    const std::string& name = channels_[static_cast<std::size_t>(c)];
+    const auto known = std::find_if(expected.begin(), expected.end(), [&](const ChannelColour& one) { return one.channel == name; });
+    const RestResidual left{at_rest(measured_.col(c) - p.output.col(c), weight_.col(c)), run_->dt};
+    if (expected.empty()) found.push_back(colour_of({left}));
+    else found.push_back(known != expected.end() ? sized(known->colour, left) : std::nullopt);
+  }
+  return found;
+}
+
+void RunResidual::set_colours(const VectorXd& theta, const Colours& colours) {
+  const Prediction p = predict(theta);
+  colour_ = colours;
+  whitened_ = (weight_.array() > 0).select(measured_, p.output);  // left-out readings have no innovation of their own
+  Index f = 0;
+  for (std::size_t c = 0; c < channels_.size(); ++c) {
+    if (!colour_[c]) continue;
+    const WhiteningFilter filter(*colour_[c], run_->dt);
+    const auto column = static_cast<Index>(c);
+    weight_.col(column) *= sigma_[c] / filter.sigma();
+    sigma_[c] = filter.sigma();
+    whitened_.col(column) = filter.filtered(whitened_.col(column));
+    ++f;
+  }
+  if (f == 0) whitened_.resize(0, 0);
+  take_colour(*this);
+}
+
+double RunResidual::log_noise_density() const {
+  double sum = 0;
+  for (std::size_t c = 0, f = 0; c < channels_.size(); ++c) {
+    const auto count = static_cast<double>((weight_.col(static_cast<Index>(c)).array() > 0).count());
+    const WhiteningFilter* filter = colour(c) ? &filters_[f++] : nullptr;
+    sum -= count * std::log(sigma_[c] / (filter ? filter->gain() : 1));
+    if (filter) sum += filter->log_start_information();
+  }
+  return sum;
+}
+
+void RunResidual::take_colour(const RunResidual& other) {
+  if (&other != this) colour_ = other.colour_, whitened_ = other.whitened_;
+  filters_.clear();
+  while (!free_.empty() && free_.back() >= states_) free_.pop_back();
+  Index states = states_;
+  for (const std::optional<NoiseColour>& colour : colour_) {
+    if (!colour) continue;
+    filters_.emplace_back(*colour, run_->dt);
+    for (Index i = 0; i < filters_.back().states(); ++i) free_.push_back(states++);
+  }
+  if (!filters_.empty()) shared_.reset();  // responses behind filters are this run's own
+  lay_out();
+}
+
+/// [c | reading] of the noise's state at the first sample, which is the filter's start less what the offset has settled it to.
+void RunResidual::add_colour_rows() {
+  Index state = first_offset_;
+  for (const WhiteningFilter& filter : filters_) state -= filter.states();
+  for (std::size_t c = 0, f = 0; c < colour_.size(); ++c) {
+    if (!colour_[c]) continue;
+    const WhiteningFilter& filter = filters_[f++];
+    const MatrixXd root = filter.start_information();
+    const VectorXd settled = root * filter.settled();
+    MatrixXd rows = MatrixXd::Zero(filter.states(), unknowns_ + 1);
+    rows.middleCols(state, filter.states()) = root;
+    rows.col(first_offset_ + static_cast<Index>(c)) = settled;
+    rows.col(unknowns_) = settled * whitened_(0, static_cast<Index>(c));
+    angle_rows_.push_back(std::move(rows));
+    state += filter.states();
+  }
+}
+
+void RunResidual::filter_output(LinearSystem& system, ExactStep& step) const {
+  if (filters_.empty()) return;
+  if (!system.feedback.empty()) throw std::logic_error("coloured noise of a nonlinear model");
+  for (std::size_t c = 0, f = 0; c < colour_.size(); ++c)
+    if (colour_[c]) filters_[f++].append(static_cast<Index>(c), system, step);
+}
+
+}  // namespace unrig

@@ -1,0 +1,136 @@
+#include "fit/likelihood/noise_colour.h"
+
+#include <gtest/gtest.h>
+
+#include <Eigen/Cholesky>
+#include <Eigen/QR>
+#include <cmath>
+#include <numbers>
+#include <random>
+
+#include "core/propagate/response.h"
+
+namespace unrig {
+namespace {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+constexpr double dt = 0.002;
+
+NoiseColour three_parts() { return {VectorXd{{0.3, 4, 40}}, VectorXd{{2, 0.5, 0.1}}, 0.7}; }
+
+/// Sums of independent first-order processes, sample by sample: nothing of the filter is in it.
+VectorXd noise_of(const NoiseColour& colour, Index samples, unsigned seed) {
+  std::mt19937_64 random(seed);
+  std::normal_distribution<double> normal;
+  VectorXd noise = VectorXd::NullaryExpr(samples, [&] { return std::sqrt(colour.white) * normal(random); });
+  for (Index i = 0; i < colour.corner.size(); ++i) {
+    const double pole = std::exp(-2 * std::numbers::pi * colour.corner[i] * dt), size = std::sqrt(colour.power[i]);
+    double part = size * normal(random);
+    for (Index k = 0; k < samples; ++k) {
+      noise[k] += part;
+      part = pole * part + size * std::sqrt(1 - pole * pole) * normal(random);
+    }
+  }
+  return noise;
+}
+
+MatrixXd covariance_of(const NoiseColour& colour, Index samples) {
+  MatrixXd covariance = colour.white * MatrixXd::Identity(samples, samples);
+  for (Index i = 0; i < colour.corner.size(); ++i)
+    for (Index a = 0; a < samples; ++a)
+      for (Index b = 0; b < samples; ++b) covariance(a, b) += colour.power[i] * std::exp(-2 * std::numbers::pi * colour.corner[i] * dt * std::abs(static_cast<double>(a - b)));
+  return covariance;
+}
+
+/// Behind the filter, with the noise's own start where its prior and the readings put it: chi-square and determinant are those of the whole covariance.
+TEST(WhiteningFilter, SaysWhatTheWholeCovarianceSays) {
+  const NoiseColour colour = three_parts();
+  const WhiteningFilter filter(colour, dt);
+  constexpr Index n = 300;
+  const MatrixXd covariance = covariance_of(colour, n);
+  const Eigen::LLT<MatrixXd> root(covariance);
+  LinearSystem system;  // one state that is read and does nothing
+  system.A = system.B = system.C = system.D = DualMatrix(MatrixXd::Zero(1, 1));
+  system.B = DualMatrix(MatrixXd(1, 0)), system.D = DualMatrix(MatrixXd(1, 0));
+  ExactStep step{dt, DualMatrix(MatrixXd::Zero(1, 1)), {}, DualMatrix(MatrixXd(1, 0)), DualMatrix(MatrixXd(1, 0))};
+  filter.append(0, system, step);
+  const MatrixXd from_start = free_response_rows(system, step, n).front().rightCols(filter.states());
+  for (const unsigned seed : {1u, 2u, 3u}) {
+    const VectorXd y = noise_of(colour, n, seed).array() + 3;  // an offset that the filter starts settled to
+    // Difference between the filter's state and the noise's own is u: white = filtered(y) - response(u), and the noise's start is settled (y_0 - 0) - u.
+    MatrixXd rows(n + filter.states(), filter.states());
+    rows << from_start / filter.sigma(), filter.start_information();
+    VectorXd right(n + filter.states());
+    right << filter.filtered(y) / filter.sigma(), filter.start_information() * filter.settled() * y[0];
+    const VectorXd u = rows.colPivHouseholderQr().solve(right);
+    const double chi2 = (right - rows * u).squaredNorm();
+    EXPECT_NEAR(chi2, root.matrixL().solve(y).squaredNorm(), 1e-6 * chi2);
+    // -2 log of the density: n log s^2, the start's prior, and what the readings say of the start.
+    const double determinant = 2 * static_cast<double>(n) * std::log(filter.sigma() / filter.gain()) - 2 * filter.log_start_information() + std::log((rows.transpose() * rows).determinant());
+    EXPECT_NEAR(determinant, 2 * MatrixXd(root.matrixL()).diagonal().array().log().sum(), 1e-5);
+  }
+}
+
+TEST(WhiteningFilter, LeavesAConstantAlone) {
+  const WhiteningFilter filter(three_parts(), dt);
+  EXPECT_LT((filter.filtered(VectorXd::Constant(50, 2.5)).array() - 2.5).abs().maxCoeff(), 1e-10);
+}
+
+/// White noise is called coloured once in a thousand, and the likelihood of powers that may not be negative is less than the threshold's chi-square.
+TEST(NoiseColour, IsSeldomSeenInWhiteNoise) {
+  constexpr unsigned trials = 500;
+  int seen = 0;
+  for (unsigned seed = 0; seed < trials; ++seed) seen += colour_of({{noise_of({VectorXd(0), VectorXd(0), 0.04}, 2000, seed), dt}}) ? 1 : 0;
+  EXPECT_LE(seen, 3);
+}
+
+/// Variances over bands of frequency, which the record determines, where single parts trade with each other.
+TEST(NoiseColour, IsFoundWithItsSize) {
+  const NoiseColour truth{VectorXd{{0.8, 9}}, VectorXd{{0.3, 0.2}}, 0.5};
+  const auto spectrum = [](const NoiseColour& c, double f) {
+    double sum = c.white;
+    for (Index i = 0; i < c.corner.size(); ++i) {
+      const double a = std::exp(-2 * std::numbers::pi * c.corner[i] * dt);
+      sum += c.power[i] * (1 - a * a) / (1 - 2 * a * std::cos(2 * std::numbers::pi * f * dt) + a * a);
+    }
+    return sum;
+  };
+  for (const unsigned seed : {1u, 2u, 3u, 4u, 5u}) {
+    VectorXd one = noise_of(truth, 6000, seed), other = noise_of(truth, 3000, seed + 100);
+    one.segment(2000, 300).setConstant(std::nan(""));  // the shaft moves
+    const std::optional<NoiseColour> found = colour_of({{one, dt}, {other, dt}});
+    ASSERT_TRUE(found) << seed;
+    for (const double f : {0.5, 2.0, 10.0, 50.0, 200.0}) EXPECT_NEAR(std::log(spectrum(*found, f) / spectrum(truth, f)), 0, 0.5) << seed << " at " << f << " Hz";
+    EXPECT_NEAR(std::log(spectrum(*found, 200) / spectrum(truth, 200)), 0, 0.08) << "thousands of lines";
+  }
+}
+
+/// What physics leaves is no noise: lines and decays that ring are not taken for a colour.
+TEST(NoiseColour, IsNotALineNorARinging) {
+  for (const unsigned seed : {1u, 2u, 3u, 4u}) {
+    const VectorXd white = noise_of({VectorXd(0), VectorXd(0), 0.04}, 3000, seed);
+    VectorXd line = white, ringing = white;
+    for (Index k = 0; k < white.size(); ++k) {
+      const double t = dt * static_cast<double>(k), w = 2 * std::numbers::pi * 7.3;
+      line[k] += 0.1 * std::sin(w * t + seed);
+      ringing[k] += 0.6 * std::exp(-0.03 * w * t) * std::cos(w * t);
+    }
+    EXPECT_FALSE(colour_of({{line, dt}})) << seed;
+    EXPECT_FALSE(colour_of({{ringing, dt}})) << seed;
+  }
+}
+
+TEST(NoiseColour, OfOthersTakesTheSizeThatIsHere) {
+  NoiseColour truth = three_parts();
+  const std::optional<NoiseColour> here = sized(truth, {3 * noise_of(truth, 20000, 7), dt});
+  ASSERT_TRUE(here);
+  EXPECT_NEAR(here->white, 9 * truth.white, 0.05 * 9 * truth.white);  // 10 000 lines: 1 %
+  EXPECT_NEAR(here->power[2] / here->white, truth.power[2] / truth.white, 1e-9);
+  EXPECT_FALSE(sized(truth, {VectorXd::Constant(500, std::nan("")), dt}));
+}
+
+}  // namespace
+}  // namespace unrig
