@@ -269,6 +269,12 @@ void describe_motion(const RunInLegs& legs, const VectorXd& theta, const Run& ru
   result.onset = run.time(first);
 }
 
+std::string coloured(const Run& run, const std::string& channel, const NoiseColour& colour) {
+  return fmt::format("{}: the noise of {} is coloured: {:.3g} {} in all (r.m.s.), {:.3g} white. Load and band allow for it. If the instrument cannot make so much, something is missing from the rig of the fit: `unrig diagnose` looks "
+                     "for it.",
+                     run.file, channel, std::sqrt(colour.variance()), run.channel(channel).unit, std::sqrt(colour.white));
+}
+
 std::string other_readings(const CorrectProblem& problem) {
   return fmt::format("{}: other readings or conditions than those that {} was fitted to; the band takes them for the fitted ones. Fit again, or give the new recording another name.", problem.run.file, problem.fit.file);
 }
@@ -454,6 +460,7 @@ CorrectResult correct_at(const CorrectProblem& problem, const FittedNumbers* num
   describe_motion(legs, theta, run, result);
 
   result.noise = legs.residual(0).noise(0);
+  if (const NoiseColour* colour = legs.residual(0).colour(0)) result.warnings.push_back(coloured(run, legs.residual(0).channels().front(), *colour));
   const Index slope = model.index("normal_force_slope");
   result.slope = theta[slope];
   result.slope_std = of_theta.root().row(slope).norm();

@@ -1,6 +1,7 @@
 #include "fit/likelihood/noise_colour.h"
 
 #include <Eigen/Eigenvalues>
+#include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 #include <iterator>
@@ -136,8 +137,11 @@ double once_in_a_thousand(double n) {
   return n * std::pow(1 - spread + normal * std::sqrt(spread), 3);
 }
 
-/// Bartlett's test of the cumulative periodogram: whether lines in units of their spectrum are those of white noise, but once in a thousand.
+/// Whether lines in units of their spectrum are those of white noise: Bartlett's test of the cumulative periodogram for what is broad, and that of the largest line for what is narrow (R. A. Fisher,
+/// Proc. R. Soc. A 125 (1929) 54), each failed once in a thousand.
 bool is_white(const VectorXd& relative) {
+  constexpr double once = 1e-3;
+  if (relative.maxCoeff() / relative.mean() > std::log(static_cast<double>(relative.size()) / once)) return false;
   constexpr double once_in_a_thousand_of_kolmogorov = 1.9495;
   const auto count = static_cast<double>(relative.size());
   const double total = relative.sum();

@@ -38,7 +38,7 @@ struct RestResidual {
 ///
 /// Whittle's likelihood of the periodograms of stretches without left-out samples is greatest. The powers are found by the multiplicative steps of C. Fevotte, N. Bertin and J.-L. Durrieu,
 /// Neural Comput. 21 (2009) 793, for the distance of Itakura and Saito. Colour counts where twice the logarithm of its likelihood over white noise's has a probability below 1e-3 in white noise,
-/// and where what the colour leaves of each stretch is white (Bartlett's test, at the same level).
+/// and where what the colour leaves of each stretch is white (Bartlett's test, and Fisher's of the largest line, at the same level).
 std::optional<NoiseColour> colour_of(const std::vector<RestResidual>& residuals);
 
 /// `colour` in the size that is most likely for this residual; none where it is not a stretch long enough.
