@@ -15,6 +15,7 @@
 #include "core/rig/gauge_lever.h"
 #include "fit/uncertainty/coloured_noise.h"
 #include "fit/likelihood/explained.h"
+#include "fit/likelihood/modal_frequencies.h"
 #include "fit/likelihood/readings_noise.h"
 #include "fit/likelihood/share_followed.h"
 
@@ -128,7 +129,7 @@ FittedRun describe_run(const RunResidual& residual, const VectorXd& theta, doubl
   };
   for (std::size_t c = 0; c < p.channels.size(); ++c) {
     const VectorXd predicted = p.output.col(static_cast<Index>(c));
-    add(p.channels[c], predicted, residual.channel_weight(c), std::hypot(residual.sigma(c), sigma_of_inputs(residual, c)));
+    add(p.channels[c], predicted, residual.channel_weight(c), std::hypot(residual.sigma(c), sigma_of_inputs(residual, theta, c)));
     fitted.followed = std::min(fitted.followed, share_followed(run.channel(p.channels[c]).value, predicted, residual.channel_weight(c)));
   }
   if (p.motion.angle.size() > 0) {
@@ -189,6 +190,9 @@ void describe_parameters(const JointProblem& joint, const ParameterUncertainty& 
       if (const auto [lower, upper] = bounds_at(joint.model(), u.parameter, u.value); u.value <= lower || u.value >= upper) {
         fitted.identified = false;
         fitted.advice = fmt::format("It ended at its bound {}. ", u.value) + what_to_record(joint, u);
+      } else if (u.value >= stiffest_below(joint, u, highest_nyquist(joint.runs()))) {
+        fitted.identified = false;
+        fitted.advice = "Its mode ended at half the sampling rate: these runs would have it higher, where they do not show it. " + what_to_record(joint, u);
       } else if (!identified[which]) {
         fitted.identified = false;
         for (const DeterminedCombination& c : result.determined)

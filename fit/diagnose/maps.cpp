@@ -97,7 +97,7 @@ std::vector<ResidualMaps> residual_maps(const JointProblem& joint, const std::ve
     const RunResidual& run = joint.runs()[r];
     const VectorXd theta = joint.theta(r);
     const RunResidual::Prediction p = run.predict(theta);
-    const VectorXd left = standardised_residual(run, p, 0);
+    const VectorXd left = standardised_residual(run, theta, p, 0);
     maps.push_back({run.run().file, p.channels[0], time_frequency(left, run.run().start, run.run().dt), {}});
     if (std::find(of_force.begin(), of_force.end(), run.run().file) != of_force.end()) maps.back().force = force_map(run, p, theta, left * run.sigma(0));
   }

@@ -104,7 +104,7 @@ Mismatch locate_mismatch(const JointProblem& joint) {
     if (run.is_aside()) continue;
     const RunResidual::Prediction p = run.predict(joint.theta(r));
     for (std::size_t c = 0; c < p.channels.size(); ++c) {
-      VectorXd left = standardised_residual(run, p, c);
+      VectorXd left = standardised_residual(run, joint.theta(r), p, c);
       // In units of its own white part, where that can be told: the assumed level may be off by a few per cent.
       const double count = static_cast<double>((left.array() != 0).count());
       ChannelMismatch m{run.run().file, p.channels[c]};

@@ -123,26 +123,29 @@ std::optional<InputNoiseModel> noise_of_inputs(const Run& run, const Conditions&
   return builder.model_;
 }
 
-InputNoise::InputNoise(const LinearSystem& system, const ExactStep& step, const InputNoiseModel& inputs, const MatrixXd& weight) {
+InputNoise::InputNoise(const LinearSystem& system, const ExactStep& step, const InputNoiseModel& inputs, const MatrixXd& weight) : inputs_(inputs) {
   // x_{k+1} = F x_k + G0 n_k + G1 n_{k+1} with x - G1 n as the state, so that only n_k drives it; at first, with x = 0, that state is 0 and n_0 drives it by G0 alone.
   const Index n = system.states(), s = inputs.phi.rows(), channels = system.C.rows(), measured = inputs.j.rows();
   const MatrixXd &f = step.transition.value, now = step.input0.value.leftCols(measured), ahead = step.input1.value.leftCols(measured), at_once = system.D.value.leftCols(measured);
   struct Noise {
     MatrixXd transition, observe, process, across, direct;
+    Drive drive;
   };
   const auto noise_of = [&](const MatrixXd& push, const MatrixXd& feel) {
-    Noise noise{MatrixXd(n + s, n + s), MatrixXd(channels, n + s), {}, {}, {}};
+    Noise noise{MatrixXd(n + s, n + s), MatrixXd(channels, n + s), {}, {}, {}, {}};
     noise.transition << f, push * inputs.h, MatrixXd::Zero(s, n), inputs.phi;
     noise.observe << system.C.value, feel * inputs.h;
     MatrixXd drive(n + s, inputs.j.cols());
     drive << push * inputs.j, inputs.gamma;
     const MatrixXd read = feel * inputs.j;
     noise.process = drive * drive.transpose(), noise.across = drive * read.transpose(), noise.direct = read * read.transpose();
+    noise.drive = {drive, read};
     return noise;
   };
   const Noise first = noise_of(now, at_once), later = noise_of(f * ahead + now, system.C.value * ahead + at_once);
   transition_ = later.transition;
   observe_ = later.observe;
+  first_ = first.drive, later_ = later.drive;
 
   MatrixXd known = MatrixXd::Zero(n + s, n + s);  // covariance of the state, given the readings so far
   known.bottomRightCorner(s, s) = inputs.start;
@@ -192,6 +195,33 @@ MatrixXd InputNoise::whitened(const MatrixXd& rows) const {
     for (std::size_t i = 0; i < g.present.size(); ++i) white.row(g.present[i] * samples + k) = standard.row(static_cast<Index>(i));
   }
   return white;
+}
+
+MatrixXd InputNoise::most_probable(const VectorXd& white) const {
+  // Sources e with covariance 1 and readings y = G e + own noise: the most probable e is G^T W y, W the inverse covariance of the readings. Both transposed maps run backward
+  // (A. E. Bryson and M. Frazier, 1963); their adjoint states are each other's negative.
+  const Index channels = observe_.rows(), samples = white.size() / channels, states = transition_.rows(), s = inputs_.phi.rows(), sources = inputs_.j.cols();
+  MatrixXd source(sources, samples);
+  VectorXd adjoint = VectorXd::Zero(states), weighted(channels);
+  for (Index k = samples - 1; k >= 0; --k) {
+    const Gain& g = gains_[which_[static_cast<std::size_t>(k)]];
+    weighted.setZero();
+    if (!g.present.empty()) {
+      VectorXd standard(static_cast<Index>(g.present.size()));
+      for (std::size_t i = 0; i < g.present.size(); ++i) standard[static_cast<Index>(i)] = white[g.present[i] * samples + k];
+      weighted(g.present) = g.inverse_root.transpose() * standard - g.gain.transpose() * adjoint;
+    }
+    const Drive& drive = k == 0 ? first_ : later_;
+    source.col(k) = drive.reading.transpose() * weighted + drive.state.transpose() * adjoint;
+    adjoint = (transition_.transpose() * adjoint + observe_.transpose() * weighted).eval();
+  }
+  MatrixXd noise = MatrixXd::Zero(samples + 1, inputs_.j.rows());
+  VectorXd state = inputs_.start * adjoint.tail(s);
+  for (Index k = 0; k < samples; ++k) {
+    noise.row(k) = (inputs_.h * state + inputs_.j * source.col(k)).transpose();
+    state = (inputs_.phi * state + inputs_.gamma * source.col(k)).eval();
+  }
+  return noise;
 }
 
 }  // namespace unrig

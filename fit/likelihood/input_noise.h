@@ -40,6 +40,9 @@ class InputNoise {
   /// noise. Rows of readings that do not count are 0. A linear map, for residuals and slopes alike.
   Eigen::MatrixXd whitened(const Eigen::MatrixXd& rows) const;
 
+  /// The most probable noise of the inputs (samples + 1 rows), from readings minus model as `whitened` gives them. Minus it, the inputs' errors.
+  Eigen::MatrixXd most_probable(const Eigen::VectorXd& white) const;
+
   /// log det of the readings' covariance: what `whitened` takes from the logarithm of their likelihood, twice.
   double log_determinant() const { return log_determinant_; }
   /// Mean square of what the inputs' noise does to the reading of a channel.
@@ -51,7 +54,11 @@ class InputNoise {
     Eigen::MatrixXd inverse_root;    // of the innovations' covariance
     std::vector<Eigen::Index> present;
   };
+  InputNoiseModel inputs_;
   Eigen::MatrixXd transition_, observe_;
+  struct Drive {
+    Eigen::MatrixXd state, reading;  // by the sources of one sample
+  } first_, later_;
   std::vector<Gain> gains_;
   std::vector<std::size_t> which_;  // gain of each sample
   double log_determinant_ = 0;

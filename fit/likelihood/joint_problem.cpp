@@ -70,7 +70,7 @@ LeastSquaresProblem JointProblem::least_squares() const {
   const double highest = highest_nyquist(runs_), nyquist = runs_.empty() || moves_above(*this, theta(0), highest) ? std::numeric_limits<double>::infinity() : highest;
   for (const Unknown& u : unknowns_) {
     const auto [lower, upper] = bounds_at(*model_, u.parameter, u.value);
-    problem.unknowns.push_back({name(u), u.value, lower, upper, u.held, 0});
+    problem.unknowns.push_back({name(u), u.value, lower, std::min(upper, stiffest_below(*this, u, nyquist)), u.held, 0});
   }
   for (std::size_t r = 0; r < runs_.size(); ++r) {
     if (runs_[r].is_aside()) continue;

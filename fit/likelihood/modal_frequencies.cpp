@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numbers>
 
 #include <fmt/format.h>
@@ -35,6 +36,17 @@ bool moves_above(const JointProblem& joint, const VectorXd& theta, double nyquis
   for (std::size_t i = 0; i < model.rig().modal.size(); ++i)
     if (const ModalPlace p = place_of_mode(model, i); !held(p.stiffness) && modal_frequency(model, theta, i) >= nyquist) return true;
   return false;
+}
+
+double stiffest_below(const JointProblem& joint, const Unknown& unknown, double nyquist) {
+  constexpr double below = 1 - 1e-9;
+  for (std::size_t i = 0; i < joint.model().rig().modal.size(); ++i) {
+    const ModalPlace p = place_of_mode(joint.model(), i);
+    if (p.stiffness != unknown.parameter) continue;
+    for (const Unknown& u : joint.unknowns())
+      if (u.parameter == p.mass && u.held) return below * u.value * std::pow(2 * std::numbers::pi * nyquist, 2);
+  }
+  return std::numeric_limits<double>::infinity();
 }
 
 }  // namespace unrig

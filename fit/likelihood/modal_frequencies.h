@@ -21,4 +21,7 @@ double highest_nyquist(const std::vector<RunResidual>& runs);
 /// Modes that may move, and are above it at theta.
 bool moves_above(const JointProblem& joint, const Eigen::VectorXd& theta, double nyquist);
 
+/// What that leaves to an unknown that is the stiffness of a mode whose mass is held: a bound, at which a search can end. Infinite for any other.
+double stiffest_below(const JointProblem& joint, const Unknown& unknown, double nyquist);
+
 }  // namespace unrig

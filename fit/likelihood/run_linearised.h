@@ -18,6 +18,7 @@
 namespace unrig {
 
 class InputNoise;
+struct InputNoiseModel;
 
 namespace run_rows {
 
@@ -176,7 +177,7 @@ struct RunResidual::SharedResponses {
   std::mutex in_use;
   std::shared_ptr<const Rows> rows;
   std::shared_ptr<const Slopes> slopes;
-  std::shared_ptr<const InputNoise> input_noise;  ///< how the noise of measured inputs colours the readings (fit/likelihood/input_noise.h); none: they count as exact
+  std::shared_ptr<const InputNoiseModel> input_noise;  ///< noise of the measured inputs (fit/likelihood/input_noise.h); none: they count as exact
 };
 
 /// The model at one theta, without partials: its exact step, what the inputs alone do, where the unknown motion takes the states, and the rows
@@ -207,15 +208,19 @@ struct RunResidual::Linearised {
   double chi2 = 0;
 
   // Where noise of the inputs colours all readings of a run (fit/likelihood/run_input_noise.cpp). Its weights are then a filter over the whole record, not a number for each reading.
-  static const InputNoise* input_noise(const RunResidual& run) { return run.shared_ ? run.shared_->input_noise.get() : nullptr; }
+  std::shared_ptr<const InputNoise> noise;  // as the model at this theta lets it through; none where the inputs count as exact
+  static const InputNoiseModel* input_noise(const RunResidual& run) { return run.shared_ ? run.shared_->input_noise.get() : nullptr; }
+  static std::shared_ptr<const InputNoise> noise_through(const RunResidual& run, const Eigen::VectorXd& theta);
   static void keep_input_noise(RunResidual& run, const RunResidual& other);
   /// What `left` (samples x channels) makes most probable.
   static void settle_input_noise(RunResidual& run, const Eigen::VectorXd& theta, const Eigen::MatrixXd& left);
   /// Columns over the samples of all channels, one channel after the other, in units of the noise, white and tempered.
-  static Eigen::MatrixXd white(const RunResidual& run, const Eigen::MatrixXd& rows);
+  Eigen::MatrixXd white(const RunResidual& run, const Eigen::MatrixXd& rows) const;
+  /// The same for [minus the model's slopes in theta | other slopes | what is left], with what theta does to the filter among the slopes.
+  Eigen::MatrixXd white_slopes(const RunResidual& run, const Eigen::VectorXd& theta, Eigen::MatrixXd rows) const;
   /// A sensitivity whose residual lacks the readings still.
-  static void whiten(const RunResidual& run, Sensitivity& sensitivity);
-  static Eigen::MatrixXd standardised(const RunResidual& run, const Eigen::MatrixXd& left);
+  void whiten(const RunResidual& run, const Eigen::VectorXd& theta, Sensitivity& sensitivity) const;
+  static Eigen::MatrixXd standardised(const RunResidual& run, const Eigen::VectorXd& theta, const Eigen::MatrixXd& left);
   /// Solves the rows [c | right] of the whole record for c. `tangents`: d y / d state at its start, per channel; `start`: d state / d c there.
   void settle_white(const RunResidual& run, const Eigen::MatrixXd& start, std::vector<Eigen::MatrixXd> tangents, const Eigen::MatrixXd& right);
 };

@@ -61,7 +61,7 @@ RunResidual::NonlinearPoint RunResidual::nonlinear_point(const Linearised& lin, 
   if (!response.finite) return point;
   point.left = measured_.topRows(last_sample_) - response.output;
   point.left.rowwise() -= linear.segment(first_offset_, measured_.cols()).transpose();
-  point.chi2 = Linearised::input_noise(*this) ? Linearised::white(*this, point.left.reshaped()).squaredNorm() : weight_.topRows(last_sample_).cwiseProduct(point.left).squaredNorm();
+  point.chi2 = lin.noise ? lin.white(*this, point.left.reshaped()).squaredNorm() : weight_.topRows(last_sample_).cwiseProduct(point.left).squaredNorm();
   for (const MatrixXd& rows : angle_rows_) point.chi2 += (rows.leftCols(unknowns_) * linear - rows.col(unknowns_)).squaredNorm();
   return point;
 }
@@ -93,7 +93,7 @@ bool RunResidual::stack_nonlinear_rows(Linearised& lin, const VectorXd& theta, c
     from.jerk_tangent = phase.moving ? jerk_slope(s) : MatrixXd();
     NonlinearResponse response = follow(lin.system, lin.step, theta, from, s.length(), Partials::none);
     if (!response.finite) return false;
-    if (Linearised::input_noise(*this)) {  // there is one phase
+    if (lin.noise) {  // there is one phase
       MatrixXd right = measured_.topRows(last_sample_) - response.output;
       for (Index c = 0; c < measured_.cols(); ++c) right.col(c) += response.tangent[static_cast<std::size_t>(c)] * (start * linear);
       lin.settle_white(*this, start, std::move(response.tangent), right);

@@ -90,8 +90,8 @@ RunResidual::Sensitivity RunResidual::sensitivity(const VectorXd& theta) const {
     channel.slope.block(s.first, 0, s.length(), parameters) = m.leftCols(parameters);
   });
   for (const run_rows::Block& block : lin.blocks) add_prediction_slope(lin, block, moves, result.channels[static_cast<std::size_t>(block.channel)].slope);
-  const bool coloured = Linearised::input_noise(*this) != nullptr;
-  if (coloured) Linearised::whiten(*this, result);
+  const bool coloured = lin.noise != nullptr;
+  if (coloured) lin.whiten(*this, theta, result);
   for (Index c = 0; c < measured_.cols() && !coloured; ++c) {
     Sensitivity::PerChannel& channel = result.channels[static_cast<std::size_t>(c)];
     channel.residual = weight_.col(c).cwiseProduct(channel.residual + readings().col(c));

@@ -36,6 +36,7 @@ Index RunResidual::longest_phase(bool moving) const {
 
 std::shared_ptr<RunResidual::Linearised> RunResidual::linearise(const VectorXd& theta) const {
   auto lin = std::make_shared<Linearised>();
+  lin->noise = Linearised::noise_through(*this, theta);
   std::unique_lock<std::mutex> lock;
   if (shared_) lock = std::unique_lock(shared_->in_use);
   const bool known = shared_ && shared_->rows && shared_->rows->theta == theta && shared_->rows->samples == samples_of_free_response();
@@ -217,7 +218,7 @@ const rest_rows::SmoothReadings& RunResidual::smooth_readings(Index channel, con
 /// All rows [c | y], those of phases at rest rotated and cut to what c can reach; solves for c. What the state that the run arrived in does lies in the span of the free response: it is taken
 /// from the readings behind the rotations.
 void RunResidual::stack_rows(Linearised& lin) const {
-  if (Linearised::input_noise(*this)) {
+  if (lin.noise) {
     MatrixXd from = MatrixXd::Zero(lin.system.states(), unknowns_);
     for (std::size_t i = 0; i < free_.size(); ++i) from(free_[i], first_state_ + static_cast<Index>(i)) = 1;
     lin.settle_white(*this, from, free_response_rows(lin.system, lin.step, last_sample_), measured_.topRows(last_sample_) - lin.known.topRows(last_sample_));
@@ -381,7 +382,7 @@ RunResidual::Evaluation RunResidual::differentiate(const Solution& solution) con
   const Linearised& lin = *solution.model;
   const auto parameters = static_cast<Index>(model_->parameters().size());
   if (!std::isfinite(solution.chi2)) return says_nothing(parameters, unknowns_);
-  const bool coloured = Linearised::input_noise(*this) != nullptr;
+  const bool coloured = lin.noise != nullptr;
   std::vector<run_rows::Rotated> rotated_blocks(coloured ? 0 : lin.blocks.size());
   double beside = 0;
   MatrixXd whole = MatrixXd::Zero(coloured ? last_sample_ * measured_.cols() : 0, parameters + 1);
@@ -407,7 +408,7 @@ RunResidual::Evaluation RunResidual::differentiate(const Solution& solution) con
     block.rotate(s, std::move(m), rotated_blocks[b]);
   });
   std::vector<MatrixXd> reached, others{std::sqrt(beside) * RowVectorXd::Unit(parameters + 1, parameters)};
-  if (coloured) reached.push_back(Linearised::white(*this, whole));
+  if (coloured) reached.push_back(lin.white_slopes(*this, solution.theta, std::move(whole)));
   for (std::size_t b = 0; b < rotated_blocks.size(); ++b) {
     reached.push_back(lin.blocks[b].reached(rotated_blocks[b]));
     others.insert(others.end(), rotated_blocks[b].others.begin(), rotated_blocks[b].others.end());

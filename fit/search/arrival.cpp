@@ -431,8 +431,9 @@ void refine(Arrival& arrival, const FitProblem& problem) {
     solve(arrival);  // the first time for the noise levels' sake
     if (!changed) break;
   }
-  // Noise of the inputs comes out as the model has it, which the last search has moved.
-  const bool noisy_inputs = std::any_of(joint.runs().begin(), joint.runs().end(), [](const RunResidual& run) { return !run.is_aside() && sigma_of_inputs(run, 0) > 0; });
+  // How much noise the readings have of their own shows once the model lets through as much of the inputs' as the rig does.
+  bool noisy_inputs = false;
+  for (std::size_t r = 0; r < joint.runs().size(); ++r) noisy_inputs = noisy_inputs || (!joint.runs()[r].is_aside() && sigma_of_inputs(joint.runs()[r], joint.theta(r), 0) > 0);
   constexpr double hardly = 1e-3;
   double before = joint.chi2();
   for (int round = 0; noisy_inputs && round < rounds; ++round) {

@@ -65,7 +65,7 @@ std::vector<LeftOfRun> left_of_runs(const JointProblem& joint) {
     }
     double power = 0;
     for (std::size_t c = 0; c < p.channels.size(); ++c) {
-      const VectorXd left = standardised_residual(run, p, c);
+      const VectorXd left = standardised_residual(run, joint.theta(r), p, c);
       const auto samples = static_cast<double>((left.array() != 0).count());
       power += left.squaredNorm();
       all[r].samples += samples;

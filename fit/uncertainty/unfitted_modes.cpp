@@ -42,9 +42,9 @@ std::optional<std::size_t> nearest_mode(const std::vector<ModalMode>& modes, dou
 double around(const VectorXd& power, Index line) { return power.segment(line - 1, 3).maxCoeff(); }
 
 /// Of one channel: marks modes with a line that is followed, and keeps for the others the strongest that is not.
-void look_at_channel(const RunResidual& run, const RunResidual::Prediction& p, std::size_t c, std::vector<bool>& followed, std::vector<UnfittedMode>& left_over) {
+void look_at_channel(const RunResidual& run, const VectorXd& theta, const RunResidual::Prediction& p, std::size_t c, std::vector<bool>& followed, std::vector<UnfittedMode>& left_over) {
   const VectorXd& reading = run.run().channel(p.channels[c]).value;
-  const VectorXd weight = run.channel_weight(c), standardised = standardised_residual(run, p, c);
+  const VectorXd weight = run.channel_weight(c), standardised = standardised_residual(run, theta, p, c);
   const VectorXd read = power_of(reading, weight), left = power_of(reading - p.output.col(static_cast<Index>(c)), weight), white = power_of(standardised, weight), floor = floor_of(white);
   const double spacing = 1 / (run.run().dt * static_cast<double>(reading.size()));
   for (const Peak& peak : peaks_above(read, floor_of(read), clearly)) {
@@ -71,7 +71,7 @@ std::vector<UnfittedMode> unfitted_modes(const JointProblem& joint) {
     const RunResidual& run = joint.runs()[r];
     const RunResidual::Prediction p = run.predict(joint.theta(r));
     if (run.is_aside() || !p.output.allFinite()) continue;
-    for (std::size_t c = 0; c < p.channels.size(); ++c) look_at_channel(run, p, c, followed, left_over);
+    for (std::size_t c = 0; c < p.channels.size(); ++c) look_at_channel(run, joint.theta(r), p, c, followed, left_over);
   }
   for (std::size_t i = 0; i < count; ++i)
     if (!followed[i] && left_over[i].over_floor > 0) found.push_back(left_over[i]);
