@@ -1,5 +1,7 @@
 #include "core/check/causes.h"
 
+#include "core/check/run_estimate.h"
+
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -20,6 +22,8 @@ Channel* column(Run& run, std::string_view name) {
 
 bool has_angle(const Run& run) { return run.kind == RunKind::step && run.find("alpha") && run.find("gauge"); }
 bool flows(const Run& run) { return has_angle(run) && run.speed > 0; }
+bool turns_in_a_decay(const Run& run) { return run.kind == RunKind::pluck && run.find("alpha") && shaft_turns(run.channel("alpha").value); }
+bool step_without_motion(const Run& run) { return run.kind == RunKind::step && run.find("alpha") && !shaft_turns(run.channel("alpha").value); }
 bool always(const Run&) { return true; }
 
 std::string times(double factor) { return fmt::format("{:.4g} times", factor); }
@@ -27,21 +31,21 @@ std::string times(double factor) { return fmt::format("{:.4g} times", factor); }
 /// A column that reads `factor` times what it should.
 RunCause scaled(const char* name, double factor, std::string words, double price = 0) {
   const std::string what = std::string(name) == "gauge" ? "the gauge reads " : "the angle is ";
-  return {{what + times(factor) + " what", std::move(words), factor, price}, has_angle, [=](Run& run) { column(run, name)->value /= factor; }};
+  const std::string says = factor > 0 ? what + times(factor) + " what {} say" : std::string("gauge and angle have opposite signs (-1 times what {} say)");
+  return {{says, std::move(words), factor, price}, has_angle, [=](Run& run) { column(run, name)->value /= factor; }};
 }
 
-RunCause other_clock(double factor, std::string words) {
-  const std::string says = factor > 1 ? "the clock's seconds are too many, " + times(factor) + " what" : "the clock's seconds are too few, " + times(factor) + " what";
-  return {{says, std::move(words), factor, 0}, always, [=](Run& run) { run.dt /= factor, run.start /= factor; }};
+RunCause other_clock(double factor, std::string words, double price = 0) {
+  return {{"its time is " + times(factor) + " what {} say", std::move(words), factor, price}, always, [=](Run& run) { run.dt /= factor, run.start /= factor; }};
 }
 
 RunCause other_speed(double factor, std::string words, double price) {
-  return {{"the speed is " + times(factor) + " what", std::move(words), factor, price}, flows, [=](Run& run) { run.speed /= factor; }};
+  return {{"the speed is " + times(factor) + " what {} say", std::move(words), factor, price}, flows, [=](Run& run) { run.speed /= factor; }};
 }
 
 /// A header's density that belongs to another fluid. `lowest`, `highest`: for which the slip is likely.
 RunCause other_density(double factor, double lowest, double highest, std::string words) {
-  return {{"the density is " + times(factor) + " what", std::move(words), factor, 0}, [=](const Run& run) { return run.density >= lowest && run.density <= highest; }, [=](Run& run) { run.density /= factor; }};
+  return {{"the density is " + times(factor) + " what {} say", std::move(words), factor, 0}, [=](const Run& run) { return run.density >= lowest && run.density <= highest; }, [=](Run& run) { run.density /= factor; }};
 }
 
 /// The numbers of either column in the place of the other's.
@@ -60,50 +64,52 @@ std::vector<RunCause> make_run_causes() {
       scaled("gauge", 1 / pound_force, "pounds in a column labelled N (N written for lbf)?"),
       scaled("gauge", 1000, "newtons in a column labelled kN (kN written for N)?"),
       scaled("gauge", 1e-3, "kilonewtons in a column labelled N (N written for kN)?"),
-      scaled("gauge", gravity, "newtons in a column labelled kgf?"),
-      scaled("gauge", 1 / gravity, "kilograms in a column labelled N?"),
+      scaled("gauge", gravity, "newtons in a column labelled kgf?", 3),
+      scaled("gauge", 1 / gravity, "kilograms in a column labelled N?", 3),
       scaled("alpha", degrees, "degrees in a column labelled rad (degrees written as radians)?"),
       scaled("alpha", 1 / degrees, "radians in a column labelled deg (radians written as degrees)?"),
       other_clock(2, "the clock runs twice too slow: half of the true sampling rate written?"),
       other_clock(0.5, "the clock runs twice too fast: twice the true sampling rate written?"),
       other_clock(1000, "milliseconds in a column labelled s (ms written as s)?"),
       other_clock(1e-3, "seconds in a column labelled ms (s written as ms)?"),
-      other_clock(10, "a tenth of the true sampling rate written?"),
-      other_clock(0.1, "ten times the true sampling rate written?"),
+      other_clock(10, "a tenth of the true sampling rate written?", 6),
+      other_clock(0.1, "ten times the true sampling rate written?", 6),
       other_speed(2, "twice the true speed written?", 0),
       other_speed(0.5, "half of the true speed written?", 0),
       other_speed(1 / 0.3048, "ft/s written as m/s?", 1),
       other_speed(0.3048, "m/s written as ft/s?", 1),
-      other_speed(3.6, "km/h written as m/s?", 2),
-      other_speed(1 / 3.6, "m/s written as km/h?", 2),
-      other_speed(1 / 0.514444, "knots written as m/s?", 2),
-      other_speed(1 / 0.44704, "miles per hour written as m/s?", 2),
-      other_density(1.2 / 998.2, 0.9, 1.5, "a run in water labelled air?"),
+      other_speed(3.6, "km/h written as m/s?", 4),
+      other_speed(1 / 3.6, "m/s written as km/h?", 4),
+      other_speed(1 / 0.514444, "knots written as m/s?", 6),
+      other_speed(1 / 0.44704, "miles per hour written as m/s?", 6),
+      other_density(1.2 / 998.2, 1.0, 1.5, "a run in water labelled air?"),
       other_density(998.2 / 1.2, 900, 1100, "a run in air labelled water?"),
-      other_density(1e-3, 0.7, 1.1, "g/cm^3 written as kg/m^3 (g/cc)?"),
+      other_density(1e-3, 0.7, 1.0, "g/cm^3 written as kg/m^3 (g/cc)?"),
       other_density(1000, 9e5, 1.2e6, "kg/m^3 written as g/cm^3?"),
       other_density(1 / 16.0185, 55, 70, "lb/ft^3 written as kg/m^3?"),
   };
-  causes.push_back({{"the shaft's angle rings and the gauge rests", "the columns alpha and gauge exchanged?", 1, 2}, has_angle, exchange_columns});
+  causes.push_back({{"the angle rings and the gauge does not, against what {} say", "the columns alpha and gauge exchanged?", 1, 2}, has_angle, exchange_columns});
+  causes.push_back({{"the shaft turns in a run labelled pluck, against what {} say", "a step (kind = \"step\")?", 1, 2}, turns_in_a_decay, [](Run& run) { run.kind = RunKind::step; }});
+  causes.push_back({{"the angle never changes in a run labelled step, against what {} say", "a free decay (kind = \"pluck\"), an encoder without a signal, or a record without its beginning?", 1, 0}, step_without_motion, [](Run& run) { run.kind = RunKind::pluck; }});
   return causes;
 }
 
 bool is_beam(const Rig& rig) { return !rig.is_modal(); }
 
 RigCause other_mass(double factor, std::string words) {
-  return {{"the masses are " + times(factor) + " what", std::move(words), factor, 1}, is_beam, [=](Rig& rig) { rig.normal.inertia /= factor, rig.torsion.inertia /= factor; }};
+  return {{"the masses are " + times(factor) + " what {} say", std::move(words), factor, 1}, is_beam, [=](Rig& rig) { rig.normal.inertia /= factor, rig.torsion.inertia /= factor; }};
 }
 
 RigCause other_flexibility(double factor, std::string words) {
-  return {{"the flexibility is " + times(factor) + " what", std::move(words), factor, 1}, is_beam, [=](Rig& rig) { rig.normal.flexibility /= factor; }};
+  return {{"the flexibility is " + times(factor) + " what {} say", std::move(words), factor, 1}, is_beam, [=](Rig& rig) { rig.normal.flexibility /= factor; }};
 }
 
 RigCause other_chord(double factor, std::string words) {
-  return {{"the chord is " + times(factor) + " what", std::move(words), factor, 1}, is_beam, [=](Rig& rig) { rig.chord /= factor; }};
+  return {{"the chord is " + times(factor) + " what {} say", std::move(words), factor, 1}, is_beam, [=](Rig& rig) { rig.chord /= factor; }};
 }
 
 RigCause other_strips(double factor, std::string words) {
-  return {{"the strips' length is " + times(factor) + " what", std::move(words), factor, 1}, is_beam, [=](Rig& rig) { rig.strip_length /= factor; }};
+  return {{"the strips' length is " + times(factor) + " what {} say", std::move(words), factor, 1}, is_beam, [=](Rig& rig) { rig.strip_length /= factor; }};
 }
 
 std::vector<RigCause> make_rig_causes() {

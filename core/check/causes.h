@@ -10,7 +10,7 @@ namespace unrig {
 
 /// A slip that people make: what is said of it, and how it is undone.
 struct Cause {
-  std::string says;   ///< what was found, with the factor: "the gauge reads 4.448 times what"
+  std::string says;   ///< what was found, with the factor, {} the others: "the gauge reads 4.448 times what {} say"
   std::string words;  ///< the likely cause, a question: "are they newtons, and the column is labelled lbf?"
   double factor = 1;  ///< given over true; -1 a sign
   double price = 0;   ///< how much less likely it is than the others, in units of chi-square

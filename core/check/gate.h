@@ -24,7 +24,14 @@ struct Suspicion {
 /// the one that makes the campaign plausible is named, with its equal where these runs cannot tell two apart. Costs 20 ms for right data, a second for wrong.
 std::vector<Suspicion> suspicions(const Rig& rig, const std::vector<Run>& runs);
 
-/// One of them, grave? Then the sentence that says why there is no trustworthy answer.
-std::string why_no_answer(const std::vector<Suspicion>& suspicions);
+/// Prints each as a line `check: ...` on standard error.
+void tell(const std::vector<Suspicion>& suspicions);
+
+/// The gate before a long search: tells of all suspicions, and throws NoAnswer where one is grave. `anyway`: it only tells, for whoever knows better.
+/// A run in which what drives it never changes is left to the InputError of check_what_drives.
+void pass_the_gate(const Rig& rig, const std::vector<Run>& runs, bool anyway);
+
+/// What `--anyway` says of itself in `--help`.
+constexpr const char* anyway_help = "go on although the check finds that the input cannot be right";
 
 }  // namespace unrig

@@ -156,6 +156,19 @@ double ring_line(const VectorXd& gauge, double dt, double modelled, double refer
   return best;
 }
 
+/// Standard deviation about a straight line, over the noise.
+double restlessness(const VectorXd& x) {
+  const VectorXd t = VectorXd::LinSpaced(x.size(), -1, 1);
+  const VectorXd off = (x.array() - x.mean()).matrix() - t * (t.dot(x) / t.squaredNorm());
+  return std::sqrt(off.squaredNorm() / static_cast<double>(x.size())) / std::max(1e-300, noise_level(x));
+}
+
+/// Whether angle and gauge have changed places: in all samples the angle behind a step is as quiet as its noise and the gauge 2 to 60 times as restless.
+bool look_exchanged(const VectorXd& angle, const VectorXd& gauge) {
+  constexpr double quiet = 1.5, restless = 4;
+  return restlessness(angle) > restless && restlessness(gauge) < quiet;
+}
+
 void estimate_step(const CheckModel& check, const Run& whole, double reference, RunEstimate& found) {
   const double rest = 1 / found.modelled;
   StepMotion motion = step_motion(whole, rest);
@@ -169,6 +182,7 @@ void estimate_step(const CheckModel& check, const Run& whole, double reference, 
   found.line = ring_line(gauge.segment(motion.end, motion.last - motion.end), run.dt, found.modelled, reference);
   if (found.line > 0) found.stiffness = 2 * std::log(found.line / found.modelled);
   found.moves = true;
+  found.exchanged = look_exchanged(median_filtered(without_gaps(run.channel("alpha").value)).segment(motion.end, motion.last - motion.end), gauge.segment(motion.end, motion.last - motion.end));
   found.stalled = std::max(std::abs(motion.onset), std::abs(motion.onset + motion.step)) > stall;
   const VectorXd expected = simulated(check, run, motion, std::exp(std::isfinite(found.stiffness) ? found.stiffness : reference), found.stalled ? stalled_slope : 1.0);
   if (!expected.allFinite()) return;
@@ -186,6 +200,9 @@ void estimate_step(const CheckModel& check, const Run& whole, double reference, 
     if (std::abs(measured) > 3 * scatter) {
       found.ring = std::log(std::abs(measured) / std::abs(model));
       found.ring_phase = std::arg(measured / model);
+    } else {  // a line so faint is any
+      found.line = 0;
+      found.stiffness = nan;
     }
   }
 }
@@ -200,6 +217,15 @@ Basis few_modes(const Rig& rig) {
 RunEstimate::RunEstimate() : stiffness(nan), steady(nan), ring(nan) {}
 
 CheckModel::CheckModel(const Rig& rig) : model_(rig, rig.is_modal() ? Basis{} : few_modes(rig), wagner(Wagner::within_1e4)) {}
+
+bool shaft_turns(const VectorXd& angle) {
+  constexpr Index least = 64;
+  constexpr double clearly = 10;
+  if (angle.size() < least) return false;
+  const double noise = noise_level(angle);
+  const VectorXd x = median_filtered(without_gaps(angle));
+  return x.maxCoeff() - x.minCoeff() > clearly * noise && !moving(angle, noise).empty();
+}
 
 StrongestLine strongest_line(const VectorXd& x, double dt) {
   constexpr Index shortest = 1024, least = 32;
@@ -249,6 +275,7 @@ RunEstimate estimate(const CheckModel& check, const Run& run, double reference) 
   if (const Channel* alpha = run.find("alpha")) {
     const VectorXd angle = median_filtered(without_gaps(alpha->value));
     found.largest_angle = angle.cwiseAbs().maxCoeff();
+    found.turns = shaft_turns(alpha->value);
   }
   if (run.kind == RunKind::step) {
     estimate_step(check, run, reference, found);

@@ -29,6 +29,9 @@ struct StrongestLine {
 /// Of the whole record, its first half, quarter, ..., the part in which a line stands out most; slow drifts are left out.
 StrongestLine strongest_line(const Eigen::VectorXd& x, double dt);
 
+/// Whether a shaft moves by more than ten times its noise.
+bool shaft_turns(const Eigen::VectorXd& angle);
+
 /// What one recording says by itself, as ratios to what rig file and header let expect, in natural logarithms. NaN: it says nothing of it.
 ///
 /// Ratios of a step are those of the recording to a simulation that is driven with its own angle: at the rig file's numbers, slope 2 pi (0.55 of it beyond 12 degrees, the mean
@@ -38,6 +41,7 @@ struct RunEstimate {
   bool looked_at = false;  ///< a decay or step with a gauge, of a beam rig
   bool moves = false;      ///< step: rests, moves and rests again
   bool turns = false;      ///< the shaft moves, whatever the kind
+  bool exchanged = false;  ///< behind the step the angle rings and the gauge rests
   bool stalled = false;    ///< step: begins or ends beyond 12 degrees
   double nyquist_ratio = 0;  ///< half the sampling rate over the modelled frequency
   double periods = 0;        ///< of the modelled frequency in the record
