@@ -226,7 +226,8 @@ std::optional<Suspicion> slip(const Rig& rig, const std::vector<Run>& runs) {
   if (trials.size() > 1 && trials[1].left < best.left + alike) {
     const std::string other = where(trials[1], rig, runs);
     s.causes.push_back(trials[1].cause->words);
-    s.text += " Or " + (other == s.where ? "" : other + ": ") + sentence(trials[1], others);
+    const bool same = other == s.where && trials[1].cause->says == best.cause->says;
+    s.text += same ? " Or " + trials[1].cause->words : " Or " + (other == s.where ? "" : other + ": ") + sentence(trials[1], others);
   }
   if (alone && others_agree(rig, runs, best.runs.front(), suspicious)) s.text += fmt::format(" Without {} the other runs agree.", s.where);
   return s;

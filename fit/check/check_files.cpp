@@ -68,7 +68,7 @@ std::string channel_line(const ChannelSummary& c) {
 std::string report(const RigSummary& rig) {
   std::string text = fmt::format("rig \"{}\": {:.4g} kg{}\n", rig.name, rig.mass, rig.modal ? " (modal masses)" : "");
   if (!rig.modal) {
-    text += fmt::format("  1 N at the calibration element deflects it by {:.4g} mm\n", 1000 * rig.deflection);
+    text += fmt::format("  1 N at element {} deflects it by {:.4g} mm\n", rig.loaded_element, 1000 * rig.deflection);
     if (rig.gauge_per_newton > 0) text += fmt::format("  1 N spread over the strips reads {:.4g} N at the gauge\n", rig.gauge_per_newton);
   }
   for (const RigInMedium& m : rig.media) {

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <complex>
+#include <limits>
 #include <numbers>
 
 #include "core/check/run_estimate.h"
@@ -59,7 +60,7 @@ VectorXd numbers_of(const VectorXd& x) {
   return Eigen::Map<const VectorXd>(there.data(), static_cast<Index>(there.size()));
 }
 
-ChannelSummary channel_summary(const Channel& channel, const Run& run, const StepMotion& motion) {
+ChannelSummary channel_summary(const Channel& channel, const StepMotion& motion) {
   ChannelSummary summary{channel.name, channel.unit, 0, 0, 0, 0, {}, channel.missing, channel.clipped, channel.bad, 0};
   const VectorXd x = numbers_of(channel.value);
   constexpr Index least = 32;
@@ -69,12 +70,14 @@ ChannelSummary channel_summary(const Channel& channel, const Run& run, const Ste
   summary.mean = x.mean();
   if (x.size() < least) return summary;
   summary.noise = noise_level(channel.value);
+  VectorXd value = channel.value;
   if (channel.name == "alpha" && summary.noise > 0) {
-    const std::vector<bool> spikes = isolated_spikes(channel.value, summary.noise, moving(channel.value, summary.noise));
+    const std::vector<bool> spikes = isolated_spikes(value, summary.noise, moving(value, summary.noise));
     summary.spikes = static_cast<std::size_t>(std::count(spikes.begin(), spikes.end(), true));
+    for (Index k = 0; k < value.size(); ++k)
+      if (spikes[static_cast<std::size_t>(k)]) value[k] = std::numeric_limits<double>::quiet_NaN();
   }
-  const Index n = channel.value.size();
-  const VectorXd rest = motion.found ? numbers_of(channel.value.head(motion.begin)) : run.kind == RunKind::pluck ? numbers_of(channel.value.tail(n / 4)) : VectorXd();
+  const VectorXd rest = motion.found ? numbers_of(value.head(motion.begin)) : VectorXd();
   if (rest.size() >= least) summary.white_share = white_share(rest, summary.noise);
   return summary;
 }
@@ -101,6 +104,7 @@ RigSummary summary_of(const Rig& rig, const std::vector<Run>& runs) {
   }
   summary.mass = rig.normal.inertia.sum();
   const Index loaded = rig.loaded_element() - 1;
+  summary.loaded_element = rig.loaded_element();
   summary.deflection = rig.normal.flexibility(loaded, loaded);
   if (rig.gauge_element > 0) summary.gauge_per_newton = gauge_reading_of_unit_load(rig);
   constexpr double air = 1.2;
@@ -137,7 +141,7 @@ RunSummary summary_of(const Rig& rig, const Run& run) {
     summary.step = motion.step;
   }
   for (const Channel& channel : run.channels)
-    if (channel.name != "weight") summary.channels.push_back(channel_summary(channel, run, motion));
+    if (channel.name != "weight") summary.channels.push_back(channel_summary(channel, motion));
   return summary;
 }
 

@@ -30,7 +30,8 @@ struct RigSummary {
   std::string name;
   bool modal = false;
   double mass = 0;                ///< kg; of modes the sum of the modal masses
-  double deflection = 0;          ///< m/N at the calibration element, of a force there; 0 of modes
+  double deflection = 0;          ///< m/N at the loaded element (the gauge's calibration element, else the first), of a force there; 0 of modes
+  int loaded_element = 0;         ///< from 1
   double gauge_per_newton = 0;    ///< reading of 1 N that is spread evenly over the strips
   std::vector<RigInMedium> media; ///< vacuum, air, then those of the runs
 };
@@ -41,7 +42,7 @@ struct ChannelSummary {
   std::string name, unit;  ///< SI
   double minimum = 0, maximum = 0, mean = 0;
   double noise = 0;                   ///< standard deviation of the white part
-  std::optional<double> white_share;  ///< of the variance about a straight line in the rest before the motion (a decay: in its last quarter); none where there is no rest
+  std::optional<double> white_share;  ///< of the variance about a straight line in the rest before the motion of a step, spikes left out; none without such a rest
   std::size_t missing = 0, clipped = 0, bad = 0, spikes = 0;
 };
 
