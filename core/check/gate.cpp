@@ -79,7 +79,7 @@ double impossibilities(const RunEstimate& e) {
   if (e.nyquist_ratio < 1) sum += impossible;                 // slower samples than the lowest vibration
   if (e.periods < 1) sum += impossible;                       // shorter than one of its periods
   if (e.largest_angle > pi / 2) sum += impossible;
-  if (e.kind == RunKind::step && !e.moves) sum += impossible; // no rest, motion and rest: passed over, unless a slip explains it
+  if (e.kind == RunKind::step && !e.turns) sum += impossible;
   if (e.kind == RunKind::pluck && e.turns) sum += impossible;
   if (e.exchanged) sum += impossible;
   if (e.reversed && (!e.stalled || std::abs(e.ring_phase) > 2 * pi / 3)) sum += impossible;

@@ -89,6 +89,35 @@ std::complex<double> ringing(const VectorXd& y, double dt, Index from, Index las
   return 2.0 * (sum - level * mean) / weight.sum();
 }
 
+/// Few samples say nothing.
+constexpr Index least_samples = 64;
+
+/// The first motion between two rests, of any column that turns from one level to another.
+StepMotion motion_in(const VectorXd& column, double dt, double rest) {
+  StepMotion motion;
+  constexpr Index least_rest = 16;
+  if (column.size() < least_samples) return motion;
+  const VectorXd angle = median_filtered(without_gaps(column));
+  const std::vector<Interval> moves = moving(column, noise_level(column));
+  if (moves.empty()) return motion;
+  const Index long_enough = std::max(least_rest, static_cast<Index>(rest / dt));
+  motion.begin = moves.front().first;
+  motion.end = moves.front().last;
+  std::size_t next = 1;
+  for (; next < moves.size() && moves[next].first - motion.end < long_enough; ++next) motion.end = moves[next].last;
+  motion.last = next < moves.size() ? moves[next].first : column.size();
+  if (motion.begin < least_rest || motion.last - motion.end < long_enough) return motion;
+  motion.onset = median_of(angle, 0, motion.begin);
+  const double behind = median_of(angle, motion.end, motion.last);
+  motion.step = behind - motion.onset;
+  motion.angle = angle;
+  motion.angle.head(motion.begin).setConstant(motion.onset);
+  motion.angle.segment(motion.end, motion.last - motion.end).setConstant(behind);
+  motion.angle = smoothed(motion.angle);
+  motion.found = true;
+  return motion;
+}
+
 /// The record around its first motion, where it is too long to be looked at whole.
 constexpr Index enough = 16384;
 
@@ -163,16 +192,31 @@ double restlessness(const VectorXd& x) {
   return std::sqrt(off.squaredNorm() / static_cast<double>(x.size())) / std::max(1e-300, noise_level(x));
 }
 
-/// Whether angle and gauge have changed places: in all samples the angle behind a step is as quiet as its noise and the gauge 2 to 60 times as restless.
+/// Standard deviation about a line over the noise, of a channel at rest and of one that rings. Over the samples the gauge has 1.8 or more, and
+/// the angle (median of five) below 3 in all but six steps.
+constexpr double quiet = 1.5, restless = 4;
+
+/// Whether angle and gauge have changed places: behind the step the angle rings and the gauge does not.
 bool look_exchanged(const VectorXd& angle, const VectorXd& gauge) {
-  constexpr double quiet = 1.5, restless = 4;
   return restlessness(angle) > restless && restlessness(gauge) < quiet;
+}
+
+/// Whether the gauge rests, steps and rests again without ringing, as an angle does and a gauge does not.
+bool gauge_is_the_step(const Run& run, double rest) {
+  const VectorXd& gauge = run.channel("gauge").value;
+  const StepMotion motion = motion_in(gauge, run.dt, rest);
+  if (!motion.found) return false;
+  const VectorXd behind = median_filtered(without_gaps(gauge)).segment(motion.end, motion.last - motion.end);
+  return restlessness(behind) < quiet;
 }
 
 void estimate_step(const CheckModel& check, const Run& whole, double reference, RunEstimate& found) {
   const double rest = 1 / found.modelled;
   StepMotion motion = step_motion(whole, rest);
-  if (!motion.found) return;
+  if (!motion.found) {
+    found.exchanged = gauge_is_the_step(whole, rest);
+    return;
+  }
   const Run run = shortened(whole, motion.begin);
   if (run.samples() < whole.samples()) motion = step_motion(run, rest);
   if (!motion.found) return;
@@ -237,29 +281,8 @@ StrongestLine strongest_line(const VectorXd& x, double dt) {
 }
 
 StepMotion step_motion(const Run& run, double rest) {
-  StepMotion motion;
   const Channel* alpha = run.find("alpha");
-  constexpr Index least = 64, least_rest = 16;
-  if (!alpha || run.samples() < least) return motion;
-  const VectorXd angle = median_filtered(without_gaps(alpha->value));
-  const std::vector<Interval> moves = moving(alpha->value, noise_level(alpha->value));
-  if (moves.empty()) return motion;
-  const Index long_enough = std::max(least_rest, static_cast<Index>(rest / run.dt));
-  motion.begin = moves.front().first;
-  motion.end = moves.front().last;
-  std::size_t next = 1;
-  for (; next < moves.size() && moves[next].first - motion.end < long_enough; ++next) motion.end = moves[next].last;
-  motion.last = next < moves.size() ? moves[next].first : run.samples();
-  if (motion.begin < least_rest || motion.last - motion.end < long_enough) return motion;
-  motion.onset = median_of(angle, 0, motion.begin);
-  const double behind = median_of(angle, motion.end, motion.last);
-  motion.step = behind - motion.onset;
-  motion.angle = angle;
-  motion.angle.head(motion.begin).setConstant(motion.onset);
-  motion.angle.segment(motion.end, motion.last - motion.end).setConstant(behind);
-  motion.angle = smoothed(motion.angle);
-  motion.found = true;
-  return motion;
+  return alpha ? motion_in(alpha->value, run.dt, rest) : StepMotion{};
 }
 
 RunEstimate estimate(const CheckModel& check, const Run& run, double reference) {
@@ -269,6 +292,7 @@ RunEstimate estimate(const CheckModel& check, const Run& run, double reference) 
   if (rig.is_modal() || rig.gauge_element == 0 || !run.find("gauge")) return found;
   found.modelled = coupled_frequencies(rig, check.basis(), run.density)[0];
   found.fluid_share = fluid_share(check, run.density);
+  if (run.samples() < least_samples) return found;
   found.looked_at = run.kind == RunKind::step || run.kind == RunKind::pluck;
   found.nyquist_ratio = 0.5 / (run.dt * found.modelled);
   found.periods = run.dt * static_cast<double>(run.samples()) * found.modelled;
