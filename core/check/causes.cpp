@@ -20,6 +20,7 @@ Channel* column(Run& run, std::string_view name) {
   return found == run.channels.end() ? nullptr : &*found;
 }
 
+bool has_both(const Run& run) { return (run.kind == RunKind::step || run.kind == RunKind::pluck) && run.find("alpha") && run.find("gauge"); }
 bool has_angle(const Run& run) { return run.kind == RunKind::step && run.find("alpha") && run.find("gauge"); }
 bool flows(const Run& run) { return has_angle(run) && run.speed > 0; }
 bool turns_in_a_decay(const Run& run) { return run.kind == RunKind::pluck && run.find("alpha") && shaft_turns(run.channel("alpha").value); }
@@ -88,9 +89,9 @@ std::vector<RunCause> make_run_causes() {
       other_density(1000, 9e5, 1.2e6, "kg/m^3 written as g/cm^3?"),
       other_density(1 / 16.0185, 55, 70, "lb/ft^3 written as kg/m^3?"),
   };
-  causes.push_back({{"the angle rings and the gauge does not, against what {} say", "the columns alpha and gauge exchanged?", 1, 2}, has_angle, exchange_columns});
-  causes.push_back({{"the shaft turns in a run labelled pluck, against what {} say", "a step (kind = \"step\")?", 1, 2}, turns_in_a_decay, [](Run& run) { run.kind = RunKind::step; }});
-  causes.push_back({{"the angle never changes in a run labelled step, against what {} say", "a free decay (kind = \"pluck\"), an encoder without a signal, or a record without its beginning?", 1, 0}, step_without_motion, [](Run& run) { run.kind = RunKind::pluck; }});
+  causes.push_back({{"the angle rings and the gauge does not", "the columns alpha and gauge exchanged?", 1, 1}, has_both, exchange_columns});
+  causes.push_back({{"the shaft turns in a run labelled pluck", "a step (kind = \"step\")?", 1, 3}, turns_in_a_decay, [](Run& run) { run.kind = RunKind::step; }});
+  causes.push_back({{"the angle never changes in a run labelled step", "a free decay (kind = \"pluck\"), an encoder without a signal, or a record without its beginning?", 1, 0}, step_without_motion, [](Run& run) { run.kind = RunKind::pluck; }});
   return causes;
 }
 
