@@ -231,7 +231,8 @@ TEST_F(Check, SaysWhatADecayDoesNotDetermine) {
   const Finished finished = unrig({"check", "--rig", rig, "-o", out}, {directory.file("decay.csv", decay)});
   ASSERT_EQ(finished.status, 0) << finished.err;
   std::map<std::string, json> determined;
-  for (const json& parameter : json::parse(read_text(out))["determined"]) determined[parameter["name"].get<std::string>()] = parameter;
+  const json checked = json::parse(read_text(out));
+  for (const json& parameter : checked["determined"]) determined[parameter["name"].get<std::string>()] = parameter;
   EXPECT_FALSE(determined.at("modal[1].mass")["determined"].get<bool>()) << "a decay gives stiffness and damping per mass";
   EXPECT_THAT(determined.at("modal[1].mass")["advice"].get<std::string>(), HasSubstr("Record a run with a measured force"));
   EXPECT_TRUE(determined.at("modal[1].stiffness")["determined"].get<bool>());
