@@ -12,6 +12,7 @@
 
 #include "core/check/causes.h"
 #include "core/check/run_estimate.h"
+#include "core/check/waveform_gate.h"
 #include "core/files/error.h"
 #include "core/run/run_limits.h"
 
@@ -118,10 +119,11 @@ class Campaign {
     }
   }
 
-  double reference() const {
+  double reference() {
     std::optional<double> nearest;
     for (const RunEstimate& e : estimates_)
-      if (e.kind == RunKind::pluck && std::isfinite(e.stiffness) && (!nearest || std::abs(e.stiffness) < std::abs(*nearest))) nearest = e.stiffness;
+      if (e.kind == RunKind::pluck && std::isfinite(e.stiffness) && (!nearest || std::abs(e.stiffness) < std::abs(*nearest))) nearest = e.stiffness, decay_share_ = e.fluid_share;
+    decays_ = nearest.has_value();
     return nearest.value_or(0);
   }
 
@@ -145,6 +147,27 @@ class Campaign {
     return Campaign(rig, runs_).measure();
   }
 
+  /// ln C_a by what the free decays fall in the fluid, none: 0.
+  double apparent() const {
+    double sum = 0, weight = 0;
+    for (const RunEstimate& dry : estimates_)
+      for (const RunEstimate& wet : estimates_)
+        if (dry.kind == RunKind::pluck && wet.kind == RunKind::pluck && wet.fluid_share > dry.fluid_share + 0.2 && std::isfinite(dry.stiffness) && std::isfinite(wet.stiffness))
+          sum += dry.stiffness - wet.stiffness, weight += wet.fluid_share - dry.fluid_share;
+    return weight > 0 ? sum / weight : 0.0;
+  }
+  /// ln of the stiffness scale in vacuum by the free decay nearest to the rig file; none: by the first step that rings.
+  PlausibleCampaign plausible() const {
+    PlausibleCampaign campaign{model_, runs_, estimates_, reference_, apparent()};
+    if (!decays_)
+      for (const RunEstimate& e : estimates_)
+        if (std::isfinite(e.stiffness)) {
+          campaign.stiffness = e.stiffness;
+          return campaign;
+        }
+    campaign.stiffness += decay_share_ * campaign.apparent;
+    return campaign;
+  }
   double measure() const { return implausibility(estimates_); }
   const std::vector<Run>& runs() const { return runs_; }
   const std::vector<RunEstimate>& estimates() const { return estimates_; }
@@ -153,7 +176,8 @@ class Campaign {
   CheckModel model_;
   std::vector<Run> runs_;
   std::vector<RunEstimate> estimates_;
-  double reference_ = 0;
+  double reference_ = 0, decay_share_ = 0;
+  bool decays_ = false;
 };
 
 std::string short_name(const std::string& path) { return std::filesystem::path(path).filename().string(); }
@@ -207,8 +231,7 @@ constexpr double suspicious = 14, certain = 12, alike = 5;
 std::string sentence(const Trial& trial, const std::string& others) { return fmt::format(fmt::runtime(trial.cause->says), others) + "; " + trial.cause->words; }
 
 /// The slip that explains best why the campaign is implausible; none where it is plausible, or no slip makes it so.
-std::optional<Suspicion> slip(const Rig& rig, const std::vector<Run>& runs) {
-  const Campaign campaign(rig, runs);
+std::optional<Suspicion> slip(const Rig& rig, const std::vector<Run>& runs, const Campaign& campaign) {
   const double now = campaign.measure();
   if (now < suspicious) return {};
   const std::vector<Trial> trials = all_trials(rig, campaign);
@@ -281,7 +304,16 @@ std::vector<Suspicion> suspicions(const Rig& rig, const std::vector<Run>& runs) 
     if (!spoilt && (!gauge || few * gauge->clipped < static_cast<std::size_t>(gauge->value.size()))) whole.push_back(run);
   }
   if (rig.is_modal() || rig.gauge_element == 0 || whole.empty()) return found;
-  if (const auto s = slip(rig, whole)) found.push_back(*s);
+  const Campaign campaign(rig, whole);
+  if (const auto s = slip(rig, whole, campaign)) {
+    found.push_back(*s);
+    return found;
+  }
+  const PlausibleCampaign plausible = campaign.plausible();
+  std::vector<Suspicion> late = late_channels(plausible);
+  if (late.empty())
+    if (const auto s = other_element(plausible)) late.push_back(*s);
+  found.insert(found.end(), late.begin(), late.end());
   return found;
 }
 

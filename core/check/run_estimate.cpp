@@ -130,11 +130,13 @@ Run shortened(const Run& run, Index begin) {
 }
 
 /// The gauge as deviation from where it was, driven with the smooth angle.
-VectorXd simulated(const CheckModel& check, const Run& run, const StepMotion& motion, double stiffness, double slope) {
+VectorXd simulated(const CheckModel& check, const Run& run, const StepMotion& motion, double stiffness, double slope, double apparent = 1) {
   const AeroelasticModel& model = check.model();
   VectorXd theta = model.start_values();
   theta[model.index("normal.stiffness_scale")] = std::clamp(stiffness, 1e-6, 1e6);
   theta[model.index("normal_force_slope")] *= slope;
+  theta[model.index("apparent_mass_coefficient")] = apparent;
+  theta[model.index("torsion.stiffness_scale")] = theta[model.index("normal.stiffness_scale")];
   Conditions conditions = conditions_of(run);
   conditions.prescribed_pitch = true;
   conditions.mount = conditions.force = false;
@@ -311,6 +313,36 @@ RunEstimate estimate(const CheckModel& check, const Run& run, double reference) 
       found.stiffness = 2 * std::log(line.hertz / found.modelled);
     }
   }
+  return found;
+}
+
+Waveform waveform(const CheckModel& check, const Run& whole, const RunEstimate& estimated, double stiffness, double apparent) {
+  Waveform found;
+  if (!estimated.moves || estimated.stalled || !std::isfinite(estimated.steady) || estimated.reversed) return found;
+  const double rest = 1 / estimated.modelled;
+  StepMotion motion = step_motion(whole, rest);
+  const Run run = shortened(whole, motion.begin);
+  if (run.samples() < whole.samples()) motion = step_motion(run, rest);
+  if (!motion.found) return found;
+  constexpr double least_slope = 0.2, most_slope = 1.5, periods = 4, latest = 0.03;
+  const VectorXd expected = simulated(check, run, motion, std::exp(stiffness), std::clamp(std::exp(estimated.steady), least_slope, most_slope), std::exp(apparent));
+  if (!expected.allFinite()) return found;
+  const VectorXd gauge = without_gaps(run.channel("gauge").value);
+  const Index widest = std::min<Index>(static_cast<Index>(latest / run.dt), motion.begin);
+  const Index first = motion.begin, count = std::min(motion.last - widest, motion.end + static_cast<Index>(periods / (estimated.modelled * run.dt))) - first;
+  constexpr Index least = 32;
+  if (count < least) return found;
+  const auto scatter = [](const VectorXd& x) { return std::sqrt((x.array() - x.mean()).square().mean()); };
+  const VectorXd measured = gauge.segment(first, count);
+  const double varies = scatter(measured);
+  const auto misfit = [&](Index late) { return scatter(measured - expected.segment(first - late, count)) / varies; };
+  found.found = true;
+  found.misfit = found.misfit_if_late = misfit(0);
+  for (Index late = -widest; late <= widest; ++late)
+    if (const double other = misfit(late); other < found.misfit_if_late) {
+      found.misfit_if_late = other;
+      found.late = run.dt * static_cast<double>(late);
+    }
   return found;
 }
 

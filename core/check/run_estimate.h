@@ -76,4 +76,15 @@ class CheckModel {
 /// A step may ring at several lines: that one counts which is nearest to the stiffness `reference` (ln of the scale) of the free decays. Costs some milliseconds.
 RunEstimate estimate(const CheckModel& model, const Run& run, double reference = 0);
 
+/// How a step's gauge follows its own angle, at given ln of stiffness scale and of apparent-mass coefficient, slope by the steady load.
+struct Waveform {
+  bool found = false;
+  double misfit = 0;  ///< r.m.s. of gauge less simulation, over that of the gauge's variation, from the motion on for four periods of the lowest mode
+  double late = 0;    ///< s, by which the gauge follows the simulation best
+  double misfit_if_late = 0;  ///< with the simulation that much later
+};
+
+/// Of a step with rests that does not stall; costs two simulations.
+Waveform waveform(const CheckModel& model, const Run& run, const RunEstimate& estimated, double stiffness, double apparent);
+
 }  // namespace unrig
