@@ -3,6 +3,7 @@
 #include <CLI/CLI.hpp>
 #include <fmt/format.h>
 
+#include "core/check/gate.h"
 #include "core/files/command.h"
 #include "core/files/command_line.h"
 #include "core/rig/fingerprint.h"
@@ -34,6 +35,14 @@ void warn_of_amplifier(const CorrectProblem& problem, std::vector<std::string>& 
     warnings.push_back(fmt::format("{}: {}. That is right where the fitted recordings came through another amplifier than this one; otherwise fit again.", problem.rig.file, found));
 }
 
+/// The rig as stiff as it was fitted, for the check of a single run.
+Rig at_fitted_stiffness(const CorrectProblem& problem) {
+  Rig rig = problem.rig;
+  for (const auto& [name, chain] : {std::pair{"normal.stiffness_scale", &rig.normal}, std::pair{"torsion.stiffness_scale", &rig.torsion}})
+    if (const FittedParameter* scale = problem.fit.find(name, problem.run.file); scale && scale->value > 0) chain->flexibility /= scale->value;
+  return rig;
+}
+
 }  // namespace
 
 int correct_command(int argc, char** argv) {
@@ -47,6 +56,8 @@ int correct_command(int argc, char** argv) {
   app.add_option("--indicial", indicial, "indicial response (CSV)");
   app.add_option("--calibration-error", calibration, "relative standard deviation of the gauge's calibration, in place of the rig file's")
       ->check(CLI::Range(0.0, 1.0));
+  bool anyway = false;
+  app.add_flag("--anyway", anyway, anyway_help);
   Imposed imposed;
   app.add_flag("--monotone", imposed.monotone, "impose an indicial response that never falls (else only tested)");
   app.add_option("--at-step", imposed.at_step, "impose its value at the step, 0.5 for a thin airfoil (else only tested)")->check(CLI::Range(-1.0, 2.0));
@@ -63,6 +74,7 @@ int correct_command(int argc, char** argv) {
   progress("taking the rig out of " + run_path);
   if (problem.fit.rig_fingerprint.empty()) warn(fit_path + ": it does not say what the rig was: an earlier version wrote it. Whether it belongs to " + rig_path + " was not compared.");
   const MadeBy made_by{provenance_of(argc, argv, {"--indicial"}), fingerprint(problem.rig), fingerprint(problem.run, problem.rig), fingerprint(problem.fit)};
+  if (other_rig(problem.rig, problem.fit).empty()) pass_the_gate(at_fitted_stiffness(problem), {problem.run}, anyway);
   if (problem.rig.is_modal()) {
     if (imposed.any() || !indicial.empty())
       throw InputError({rig_path, 0}, "a rig known only as modes", "wanted a rig with a section for an indicial response", "Leave out --indicial, --monotone and --at-step.");

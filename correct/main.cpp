@@ -14,6 +14,7 @@
 #include "correct/correct_command.h"
 #include "correct/report/report_command.h"
 #include "fit/apparent_mass/apparent_mass_command.h"
+#include "fit/check/check_command.h"
 #include "fit/trial/collect_command.h"
 #include "fit/diagnose/diagnose_command.h"
 #include "fit/trial/trial_command.h"
@@ -24,6 +25,7 @@ namespace {
 
 constexpr unrig::Command commands[] = {
     {"import", "turn a laboratory's file (text, MATLAB, TDMS, universal file) into a run file", unrig::import_command},
+    {"check", "are rig file and recordings plausible, and what can they determine", unrig::check_command},
     {"simulate", "simulate what gauge and sensors of a rig read in a run", unrig::simulate_command},
     {"fit", "fit stiffness, damping and apparent mass of a rig to recordings", unrig::fit_command},
     {"apparent-mass", "apparent mass of the fluid from the frequencies of a dry and a wet free decay", unrig::apparent_mass_command},

@@ -6,12 +6,14 @@
 #include <algorithm>
 #include <filesystem>
 
+#include "core/check/gate.h"
 #include "core/files/command.h"
 #include "core/files/command_line.h"
 #include "core/rig/given_files.h"
 #include "core/numerics/in_parallel.h"
 #include "core/files/provenance.h"
 #include "core/files/text_file.h"
+#include "fit/check/implausible_parameters.h"
 #include "fit/effect_option.h"
 #include "fit/fit.h"
 #include "fit/fit_files.h"
@@ -25,7 +27,7 @@ int fit_command(int argc, char** argv) {
   std::string rig_path, output, circulation = "1e-4";
   std::vector<std::string> run_paths, starts, effect_ids, law_paths;
   double least = 0.1;
-  bool price = false;
+  bool price = false, anyway = false;
   app.add_option("--rig", rig_path, "rig file (TOML)")->required();
   app.add_option("runs", run_paths, "run files (CSV): free decays and steps of this rig, one or more");
   app.add_option("-o,--output", output, "result (JSON)")->required();
@@ -37,6 +39,7 @@ int fit_command(int argc, char** argv) {
   app.add_option_function<int>("--threads", use_threads, "how many threads to work in; without it, as many as the machine has")->check(CLI::Range(1, 256));
   app.add_option("--correlations", least, "smallest correlation to report")->capture_default_str();
   app.add_flag("--price", price, "how much an error of one per cent of masses, stations, chord, speed and the other numbers would move the result");
+  app.add_flag("--anyway", anyway, anyway_help);
   app.footer(effect_list() + "\nExample:\n  unrig fit --rig rig.toml dry_pluck.csv wet_pluck.csv step_a.csv -o fit.json");
   try {
     parse_command_line(app, argc, argv);
@@ -79,6 +82,7 @@ int fit_command(int argc, char** argv) {
       throw InputError({"--start", 0}, "'" + start + "'", "wanted NAME=VALUE", "Names are those of the report, values are in SI.");
     problem.start[start.substr(0, equals)] = value;
   }
+  pass_the_gate(problem.rig, problem.runs, anyway);
   Progress progress;
   problem.progress = [&](const std::string& what) { progress(what); };
   FitResult result = fit(problem);
@@ -90,7 +94,9 @@ int fit_command(int argc, char** argv) {
   write_text(output, to_json(result, problem.rig.laws));
   fmt::print("{}", report(result, least));
   if (price && result.no_answer.empty()) fmt::print("{}", result.givens.empty() ? report(price_of_numbers(problem, result)) : "The price: uncertainties are stated, and are in the errors above.\n");
-  if (result.no_answer.empty()) return exit_done;
+  const std::vector<Suspicion> suspect = implausible_parameters(result);
+  tell(suspect);
+  if (result.no_answer.empty()) return suspect.empty() || anyway ? exit_done : exit_no_answer;
   warn("no trustworthy answer: " + result.no_answer);
   return exit_no_answer;
 }

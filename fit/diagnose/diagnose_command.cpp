@@ -3,6 +3,7 @@
 #include <CLI/CLI.hpp>
 #include <fmt/format.h>
 
+#include "core/check/gate.h"
 #include "core/files/command.h"
 #include "core/files/command_line.h"
 #include "core/files/error.h"
@@ -49,6 +50,8 @@ int diagnose_command(int argc, char** argv) {
   app.add_option_function<int>("--threads", use_threads, "how many threads to work in; without it, as many as the machine has")->check(CLI::Range(1, 256));
   app.add_option("--fit", fit_output, "writes the winning fit too (fit.json), for simulate and correct");
   app.add_option("-o,--output", output, "result (JSON)")->required();
+  bool anyway = false;
+  app.add_flag("--anyway", anyway, anyway_help);
   app.footer("Example:\n  unrig diagnose --rig rig.toml dry_pluck.csv wet_pluck.csv step_a.csv step_b.csv --heldout step_c.csv -o diagnosis.json");
   try {
     parse_command_line(app, argc, argv);
@@ -67,6 +70,9 @@ int diagnose_command(int argc, char** argv) {
   check_recordings(problem);
   problem.effects = effects_of_option("--effects", ids);
   refuse_idle("--effects", problem.effects, problem.rig, problem.runs);
+  std::vector<Run> all = problem.runs;
+  all.insert(all.end(), problem.heldout.begin(), problem.heldout.end());
+  pass_the_gate(problem.rig, all, anyway);
   Progress progress;
   problem.progress = [&](const std::string& what) { progress(what); };
   Diagnosis diagnosis = diagnose(problem);
