@@ -145,7 +145,7 @@ std::vector<ChannelColour> noise_colours(const JointProblem& joint) {
     const RunResidual& run = joint.runs()[r];
     const RunResidual::Prediction p = run.predict(joint.theta(r));
     for (std::size_t c = 0; c < p.channels.size() && !run.is_aside(); ++c) {
-      if (sigma_of_inputs(run, c) > 0) continue;  // coloured by what drives the rig
+      if (sigma_of_inputs(run, joint.theta(r), c) > 0) continue;  // coloured by what drives the rig
       const VectorXd residual = (run.run().channel(p.channels[c]).value - p.output.col(static_cast<Index>(c))) / run.sigma(c);
       left[p.channels[c]].push_back({run.at_rest(residual, run.channel_weight(c)), run.run().dt});
     }

@@ -98,7 +98,7 @@ TEST_P(SubsetsOfTheCampaign, AreRecoveredOrNamed) {
 TEST(Undetermined, FreeDecayOfAModeFixesItsMassOnlyUpToAScale) {
   using namespace studies;
   const auto fitted = [](const std::vector<std::string>& runs) {
-    const SimulatedCampaign campaign = simulate_campaign({RigKind::two_modes, NoiseColour::white, runs}, 5);
+    const SimulatedCampaign campaign = simulate_campaign({RigKind::two_modes, studies::NoiseColour::white, runs}, 5);
     const FitResult result = fit(campaign.problem);
     expect_honest(result, runs.front(), [&](const FittedParameter& p) { return campaign.of(p); });
     return result;
@@ -122,7 +122,7 @@ TEST(Undetermined, FreeDecayOfAModeFixesItsMassOnlyUpToAScale) {
 TEST(Undetermined, WetDecayOfOneModeDoesNotTellApparentMass) {
   using namespace studies;
   const auto fitted = [](const std::vector<std::string>& runs) {
-    const SimulatedCampaign campaign = simulate_campaign({RigKind::one_mode_cantilever, NoiseColour::white, runs}, 11);
+    const SimulatedCampaign campaign = simulate_campaign({RigKind::one_mode_cantilever, studies::NoiseColour::white, runs}, 11);
     FitResult result = fit(campaign.problem);
     for (const FittedParameter& p : result.parameters)
       if (p.identified) {
@@ -147,7 +147,7 @@ TEST(Undetermined, CombinationsHoldWhereTheHeldParameterIsOff) {
   using namespace studies;
   int seen = 0;
   for (unsigned seed = 11; seed < 31; ++seed) {
-    const SimulatedCampaign campaign = simulate_campaign({RigKind::one_mode_cantilever, NoiseColour::white, {"wet_pluck"}}, seed);
+    const SimulatedCampaign campaign = simulate_campaign({RigKind::one_mode_cantilever, studies::NoiseColour::white, {"wet_pluck"}}, seed);
     const FitResult result = fit(campaign.problem);
     for (const DeterminedCombination& c : result.determined) {
       const double truth = combination_at([&](const FittedParameter& p) { return campaign.of(p); }, c, result);
@@ -163,7 +163,7 @@ TEST(Undetermined, CombinationsHoldWhereTheHeldParameterIsOff) {
 /// eight per cent higher there, too little for other starts to be tried.
 TEST(WrongMinimum, IsLeftWhereARunKeepsMoreThanChance) {
   using namespace studies;
-  const SimulatedCampaign campaign = simulate_campaign({RigKind::tow_tank, NoiseColour::white, {"dry_pluck", "wet_pluck", "step_a", "step_b"}}, 4360);
+  const SimulatedCampaign campaign = simulate_campaign({RigKind::tow_tank, studies::NoiseColour::white, {"dry_pluck", "wet_pluck", "step_a", "step_b"}}, 4360);
   const FitResult result = fit(campaign.problem);
   expect_honest(result, "campaign 4360", [&](const FittedParameter& p) { return campaign.of(p); });
   EXPECT_LT(result.reduced_chi2(), 1.05);

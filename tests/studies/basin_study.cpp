@@ -67,7 +67,7 @@ int study(int argc, char** argv) {
 
   std::vector<CampaignRecipe> recipes;
   for (const CampaignRecipe& r : all_recipes())  // everything that was recorded, white noise
-    if (r.noise == NoiseColour::white && (r.runs.size() == 4 || (r.runs.size() == 2 && r.runs[0] == "pluck")) && r.name().find(only) != std::string::npos) recipes.push_back(r);
+    if (r.noise == studies::NoiseColour::white && (r.runs.size() == 4 || (r.runs.size() == 2 && r.runs[0] == "pluck")) && r.name().find(only) != std::string::npos) recipes.push_back(r);
   std::vector<double> stiffness{0.4, 0.5, 0.63, 0.8, 1, 1.25, 1.6, 2, 2.5}, damping{0.1, 0.3, 1, 3, 10};
   if (short_form) stiffness = {0.5, 2}, damping = {0.1, 10};
 

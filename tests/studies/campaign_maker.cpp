@@ -24,7 +24,7 @@ double near(Random& random, double value, double factor) { return value * std::e
 /// Noise of standard deviation 1.
 class Noise {
  public:
-  Noise(NoiseColour colour, double dt, Random& random) : random_(random), coloured_(colour == NoiseColour::coloured) {
+  Noise(NoiseColour colour, double dt, Random& random) : random_(random), coloured_(colour == studies::NoiseColour::coloured) {
     if (coloured_) memory_ = std::exp(-2 * pi * near(random, 7, 3.5) * dt);
     state_ = normal_(random_);
   }
@@ -119,14 +119,14 @@ VectorXd draw(const AeroelasticModel& model, Random& random) {
 
 std::string CampaignRecipe::name() const {
   static const char* const rigs[] = {"tow-tank beam", "cantilever", "oscillator", "two modes", "cantilever of one mode"};
-  std::string text = std::string(rigs[static_cast<int>(rig)]) + (noise == NoiseColour::white ? ", white:" : ", coloured:");
+  std::string text = std::string(rigs[static_cast<int>(rig)]) + (noise == studies::NoiseColour::white ? ", white:" : ", coloured:");
   for (const std::string& run : runs) text += " " + run;
   return text;
 }
 
 std::vector<CampaignRecipe> all_recipes() {
   std::vector<CampaignRecipe> recipes;
-  for (const NoiseColour noise : {NoiseColour::white, NoiseColour::coloured}) {
+  for (const NoiseColour noise : {studies::NoiseColour::white, studies::NoiseColour::coloured}) {
     for (const RigKind rig : {RigKind::tow_tank, RigKind::cantilever})
       for (const std::vector<std::string>& runs : {std::vector<std::string>{"dry_pluck", "wet_pluck", "step_a", "step_b"}, {"dry_pluck", "wet_pluck"}, {"wet_pluck", "step_a"}})
         recipes.push_back({rig, noise, runs});

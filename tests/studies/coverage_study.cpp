@@ -37,7 +37,7 @@ struct Tally {
     const auto count = [&](const std::string& name, const auto& what) {
       what(by_recipe[recipe.name()]);
       what(by_parameter[name]);
-      what(by_noise[recipe.noise == NoiseColour::white ? "white" : "coloured"]);
+      what(by_noise[recipe.noise == studies::NoiseColour::white ? "white" : "coloured"]);
     };
     for (const DeterminedCombination& c : result.determined) {
       const double truth = combination_at([&](const FittedParameter& p) { return campaign.of(p); }, c, result);

@@ -15,7 +15,7 @@ using namespace studies;
 class TwoModes : public ::testing::Test {
  protected:
   TwoModes()
-      : campaign(simulate_campaign({RigKind::two_modes, NoiseColour::white, {"pluck", "forced_a"}}, 5)),
+      : campaign(simulate_campaign({RigKind::two_modes, studies::NoiseColour::white, {"pluck", "forced_a"}}, 5)),
         model(model_of(campaign.problem.rig, campaign.problem.runs, Wagner::within_1e4)),
         joint(model, residuals()) {
     for (Unknown& u : joint.unknowns()) u.value = campaign.truth.at(joint.parameter(u).name);
