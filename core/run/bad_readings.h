@@ -40,7 +40,8 @@ SuspectReadings isolated_readings(const Eigen::VectorXd& x, ReadingOf of, const 
 ///
 /// It does where it lasts for three samples or more and the signal heads beyond it on either side: the line through the samples there (a third as many, three at least) passes it in the
 /// middle by two steps of the converter and six standard errors. The tangents of a parabola that turns within the last step of a coarse converter pass it by two steps at most. Error is that of the
-/// steps, and of the noise where that is below four steps: in more of it three largest readings are not alike. A range that the signal never comes back from is not found.
+/// steps, and of the noise where that is below four steps: in more of it three largest readings are not alike.
+/// Or it lasts for twenty samples or more up to the end of the record, and a hundred others have more noise than a step.
 std::vector<Eigen::Index> clipped_readings(const Eigen::VectorXd& x);
 
 /// Largest less smallest of the medians over five samples: a range that single bad readings do not widen. 0 where there are no readings.

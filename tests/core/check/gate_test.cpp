@@ -9,6 +9,7 @@
 #include <cmath>
 #include <filesystem>
 #include <string>
+#include <tuple>
 #include <vector>
 
 #include "core/check/run_estimate.h"
@@ -91,6 +92,35 @@ TEST(Gate, FindsTheRunAndTheFactorOfEverySlipInTheGauge) {
     EXPECT_TRUE(found.front().grave);
     EXPECT_THAT(found.front().text, HasSubstr("Without step_b.csv the other runs agree."));
   }
+}
+
+TEST(Gate, FindsAnotherGaugeOrCalibrationElement) {
+  const Rig rig = read_rig(test::null_campaign("rig.toml"));  // 7 and 16
+  for (const auto& [gauge, calibration, words] : {std::tuple{12, 16, "gauge element 12 written for 7"}, std::tuple{7, 15, "calibration element 15 written for 16"}, std::tuple{7, 17, "calibration element 17 written for 16"}}) {
+    Rig other = rig;
+    other.gauge_element = gauge;
+    other.calibration_element = calibration;
+    const std::vector<Suspicion> found = suspicions(other, null_runs());
+    ASSERT_EQ(found.size(), 1u) << words << "\n" << text_of(found);
+    EXPECT_EQ(found.front().where, "rig.toml");
+    EXPECT_THAT(found.front().text, HasSubstr(words));
+    EXPECT_TRUE(found.front().grave);
+  }
+}
+
+TEST(Gate, FindsAGaugeThatIsLateWithoutStoppingForIt) {
+  constexpr Eigen::Index late = 10;  // 20 ms
+  std::vector<unrig::Run> runs = null_runs();
+  for (Channel& channel : runs[3].channels)
+    if (channel.name == "gauge") {
+      const Eigen::VectorXd was = channel.value;
+      for (Eigen::Index k = 0; k < was.size(); ++k) channel.value[k] = was[std::max<Eigen::Index>(0, k - late)];
+    }
+  const std::vector<Suspicion> found = suspicions(read_rig(test::null_campaign("rig.toml")), runs);
+  ASSERT_EQ(found.size(), 1u) << text_of(found);
+  EXPECT_EQ(found.front().where, "step_b.csv");
+  EXPECT_NEAR(found.front().factor, 0.020, 0.0021) << "a sample is 2 ms";
+  EXPECT_FALSE(found.front().grave) << "an effect follows it";
 }
 
 TEST(Gate, ARunOfThreeSamplesSaysNothing) {

@@ -172,6 +172,21 @@ TEST(ClippedReadings, NoneAtTheTurningPointsOfASlowSignalInCoarseSteps) {
   EXPECT_THAT(clipped_readings(rounded(quiet, 1e-5)), IsEmpty()) << "no noise, five digits";
 }
 
+TEST(ClippedReadings, AreThoseOfAnAmplifierThatStaysAtTheEndOfItsRange) {
+  VectorXd x = step_record(40);
+  const double top = x.maxCoeff() + 1;
+  x.tail(1700).setConstant(top);
+  EXPECT_EQ(clipped_readings(x).size(), 1700u);
+  EXPECT_EQ(clipped_readings(-x).size(), 1700u);
+  EXPECT_EQ(clipped_readings(rounded(x, 0.3 * noise)).size(), 1700u) << "in steps finer than the noise";
+  const VectorXd ramp = VectorXd::NullaryExpr(3000, [](Index k) { return 0.01 * static_cast<double>(std::min<Index>(k, 1200)) + 1e-3 * std::sin(0.05 * static_cast<double>(std::min<Index>(k, 1200))); });
+  EXPECT_THAT(clipped_readings(ramp), IsEmpty()) << "a motion that arrives, without noise";
+  EXPECT_THAT(clipped_readings(rounded(ramp, 1e-5)), IsEmpty());
+  VectorXd force = VectorXd::Zero(3000);
+  force.segment(500, 60) = white(60, 5).cwiseAbs();
+  EXPECT_THAT(clipped_readings(force), IsEmpty()) << "a blow on a channel that rests at its end";
+}
+
 TEST(ClippedReadings, NoneInARestAtTheLargestReading) {
   VectorXd x = VectorXd::NullaryExpr(3000, [](Index k) { return k < 1000 ? 20.0 : 20 * std::cos(0.1 * static_cast<double>(k - 1000)) * std::exp(-static_cast<double>(k - 1000) / 300); });
   EXPECT_THAT(clipped_readings(rounded(x, 0.2)), IsEmpty()) << "a pluck's load before it is let go";
