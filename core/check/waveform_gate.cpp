@@ -10,7 +10,7 @@
 namespace unrig {
 namespace {
 
-constexpr double suspicious_misfit = 0.25, lowered_to = 0.25, alike = 1.3;
+constexpr double suspicious_misfit = 0.5, lowered_to = 0.25, alike = 1.3;
 
 /// Root mean square of the misfits of the small steps; none: 0.
 double misfit_of(const CheckModel& model, const PlausibleCampaign& campaign, bool anew) {

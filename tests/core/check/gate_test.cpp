@@ -96,7 +96,7 @@ TEST(Gate, FindsTheRunAndTheFactorOfEverySlipInTheGauge) {
 
 TEST(Gate, FindsAnotherGaugeOrCalibrationElement) {
   const Rig rig = read_rig(test::null_campaign("rig.toml"));  // 7 and 16
-  for (const auto& [gauge, calibration, words] : {std::tuple{12, 16, "gauge element 12 written for 7"}, std::tuple{7, 15, "calibration element 15 written for 16"}, std::tuple{7, 17, "calibration element 17 written for 16"}}) {
+  for (const auto& [gauge, calibration, words] : {std::tuple{12, 16, "gauge element 12 written for 7"}, std::tuple{7, 15, "calibration element 15 written for 16"}}) {
     Rig other = rig;
     other.gauge_element = gauge;
     other.calibration_element = calibration;
