@@ -21,6 +21,7 @@
 #include "correct/segments/knots.h"
 #include "correct/segments/load_in_legs.h"
 #include "correct/estimate/misfit.h"
+#include "correct/estimate/noise_choice.h"
 #include "correct/estimate/prior.h"
 #include "correct/long_motion/restless_correction.h"
 #include "correct/segments/run_in_legs.h"
@@ -84,13 +85,6 @@ AeroelasticModel free_model(const CorrectProblem& problem, double semichords) {
   return model;
 }
 
-/// Twice the logarithm of what the powers of a colour cost in evidence (G. Schwarz, Ann. Statist. 6 (1978) 461).
-double cost_of(const RunResidual::Colours& colours, Index observations) {
-  Index parts = 0;
-  for (const auto& colour : colours) parts += colour ? colour->power.size() : 0;
-  return static_cast<double>(parts) * std::log(static_cast<double>(observations));
-}
-
 /// The best theta with noise levels, roughness of the motion and weight of the regularisation learned on the way.
 Search estimate(RunInLegs& legs, const Prior& prior, const VectorXd& start, const std::vector<ChannelColour>& expected) {
   constexpr double roughly = 1, well = 1e-3;  // of a chi-square whose own scatter is some tens
@@ -106,28 +100,7 @@ Search estimate(RunInLegs& legs, const Prior& prior, const VectorXd& start, cons
   theta = minimise(searched(legs), prior, theta, roughly, false).solution.theta;
   legs.learn_noise_and_motion(theta);
   Search search = minimise(searched(legs), prior, theta, well, true);
-  if (legs.size() > 1 || !legs.residual(0).may_be_coloured(search.solution.theta)) return search;
-  // Noise has the colour that makes the readings most probable.
-  const RunInLegs white = legs;
-  double surprise = minus_twice_log_evidence(legs.residual(0), search);
-  const auto consider = [&](const RunResidual::Colours& colours, double charge) {
-    if (std::none_of(colours.begin(), colours.end(), [](const auto& colour) { return colour.has_value(); })) return false;
-    const VectorXd from = search.solution.theta;
-    RunInLegs coloured = white.with_colours(from, colours);
-    Search other = minimise(searched(coloured), search.prior, from, well, true);
-    const double its = minus_twice_log_evidence(coloured.residual(0), other) + charge;
-    if (!(its < surprise)) return false;
-    surprise = its;
-    search = std::move(other);
-    legs = std::move(coloured);
-    return true;
-  };
-  if (!expected.empty()) consider(legs.residual(0).colours(search.solution.theta, expected), 0);
-  const auto consider_its_own = [&] {
-    const RunResidual::Colours own = legs.residual(0).colours(search.solution.theta, {});
-    return consider(own, cost_of(own, legs.residual(0).observations()));
-  };
-  if (consider_its_own()) consider_its_own();  // what the first answer took of the colour is in the second
+  choose_colour(legs, search, expected, well);
   return search;
 }
 

@@ -161,16 +161,13 @@ bool leaves_white(const std::vector<Stretch>& stretches, const VectorXd& powers)
   return std::all_of(stretches.begin(), stretches.end(), [&](const Stretch& s) { return is_white(s.power.cwiseQuotient(s.basis * powers)); });
 }
 
-/// The parts that matter.
-NoiseColour colour_from(const VectorXd& corner, const VectorXd& powers) {
-  constexpr double least = 1e-6;  // of the whole
+/// All parts, none smaller than a spectrum of a hundredth of the white one's: what a few lines said no of may be asked again.
+NoiseColour colour_from(const VectorXd& corner, const VectorXd& powers, double dt) {
+  constexpr double least = 1e-6, hardly = 0.01;
   NoiseColour colour;
   colour.white = std::max(powers[0], least * powers.sum());
-  std::vector<Index> counts;
-  for (Index i = 0; i < corner.size(); ++i)
-    if (powers[i + 1] > least * powers.sum()) counts.push_back(i);
-  colour.corner = corner(counts);
-  colour.power = VectorXd(powers.tail(corner.size()))(counts);
+  colour.corner = corner;
+  colour.power = powers.tail(corner.size()).cwiseMax(hardly * colour.white * std::numbers::pi * dt * corner);  // a part's spectrum is power / (pi corner dt) below its corner
   return colour;
 }
 
@@ -206,7 +203,7 @@ std::optional<NoiseColour> colour_of(const std::vector<RestResidual>& residuals)
   const VectorXd powers = most_likely_powers(lines);
   const double gained = 2 * (lines.log_likelihood(lines.basis * powers) - of_white);
   if (gained < once_in_a_thousand(static_cast<double>(corner.size())) || !leaves_white(stretches, powers)) return std::nullopt;
-  return colour_from(corner, powers);
+  return colour_from(corner, powers, longest.dt);
 }
 
 std::optional<NoiseColour> sized(const NoiseColour& colour, const RestResidual& residual) {
@@ -215,7 +212,7 @@ std::optional<NoiseColour> sized(const NoiseColour& colour, const RestResidual& 
   VectorXd powers(1 + colour.power.size());
   powers << colour.white, colour.power;
   const Groups lines(stretches);
-  return colour_from(colour.corner, lines.size(lines.basis * powers) * powers);
+  return colour_from(colour.corner, lines.size(lines.basis * powers) * powers, residual.dt);
 }
 
 WhiteningFilter::WhiteningFilter(const NoiseColour& colour, double dt) : pole_(poles(colour.corner, dt)) {
