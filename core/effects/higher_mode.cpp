@@ -61,6 +61,8 @@ Effect higher_mode() {
     if (c.model.rig().is_modal()) append_mode(system, c);
   };
   e.enriches_basis = true;
+  // Seen in the roll of a ship.
+  e.only_if_named_on_modes = "a mode beside a known one passes for damping and stiffness that change with amplitude";
   return e;
 }
 

@@ -125,10 +125,7 @@ Strings Selection::candidates(const Strings& at_work, const Strings& hopeless) c
     if (!problem_.effects.empty() && std::find(problem_.effects.begin(), problem_.effects.end(), e.id) == problem_.effects.end()) continue;
     if (std::find(at_work.begin(), at_work.end(), e.id) != at_work.end()) continue;
     if (std::find(hopeless.begin(), hopeless.end(), e.id) != hopeless.end()) continue;
-    // On a rig of modes one mode more beside a known one passes for damping and stiffness that change with amplitude (roll of a ship): it is tried where it is named.
-    if (problem_.effects.empty() && e.enriches_basis && problem_.rig.is_modal()) continue;
-    // Not counted on campaigns yet: hysteresis keeps a search busy for minutes, and cubic damping passes for drag in the roll of a ship.
-    if (problem_.effects.empty() && (e.id == "bouc-wen" || e.id == "cubic-damping")) continue;
+    if (problem_.effects.empty() && !e.why_only_named(problem_.rig).empty()) continue;
     if (why_idle(e, problem_.rig, conditions).empty()) ids.push_back(e.id);
   }
   return ids;

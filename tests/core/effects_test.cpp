@@ -303,6 +303,17 @@ TEST(Effects, SayWhyTheyCannotAct) {
   for (const auto& [e, rig] : cases()) EXPECT_THAT(why_idle(*e, rig, {conditions_for(rig)}), IsEmpty()) << "otherwise the tests of this file look at less than they say";
 }
 
+TEST(Effects, SayWhyADiagnosisTriesThemOnlyWhereNamed) {
+  const auto only_named = [](const Rig& rig) {
+    std::vector<std::string> ids;
+    for (const Effect& e : effects())
+      if (!e.why_only_named(rig).empty()) ids.push_back(e.id);
+    return ids;
+  };
+  EXPECT_THAT(only_named(beam()), testing::UnorderedElementsAre("bouc-wen", "cubic-damping"));
+  EXPECT_THAT(only_named(two_modes()), testing::UnorderedElementsAre("bouc-wen", "cubic-damping", "higher-mode"));
+}
+
 TEST(Effects, UnknownIdsAreRefused) {
   EXPECT_THROW(effect("tank-waves"), std::invalid_argument);
   for (const Effect& e : effects()) EXPECT_EQ(effect(e.id).id, e.id);
