@@ -1,5 +1,6 @@
 """The Python package against the program: python3 package_test.py UNRIG SAMPLE_CAMPAIGN, with the package on PYTHONPATH. Prints one line; fails by an assertion."""
 import ast
+import importlib.util
 import json
 import pathlib
 import subprocess
@@ -74,9 +75,12 @@ with tempfile.TemporaryDirectory() as folder:
     # A fit's parameters as a data set.
     table = result.to_dataset()
     assert list(table.parameter.values) == list(result.params) and float(table.value.sel(parameter="normal.stiffness_scale")) == stiffness.value
-    result.to_netcdf(folder / "fit.nc")
-    with xarray.open_dataset(folder / "fit.nc") as back:
-        assert np.array_equal(back.value.values, table.value.values)
+    if importlib.util.find_spec("netCDF4") or importlib.util.find_spec("scipy"):  # what xarray writes NetCDF with
+        result.to_netcdf(folder / "fit.nc")
+        with xarray.open_dataset(folder / "fit.nc") as back:
+            assert np.array_equal(back.value.values, table.value.values)
+    else:
+        print("not tried: NetCDF, for want of netCDF4 and scipy")
 
     # Arrays: the same readings give the same fit; a column is a view of the run's memory.
     pluck = unrig.read_run(runs[0])
