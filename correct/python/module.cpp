@@ -25,6 +25,7 @@
 #include "fit/apparent_mass/apparent_mass_files.h"
 #include "fit/diagnose/diagnose.h"
 #include "fit/diagnose/diagnosis_files.h"
+#include "fit/simulate/simulate_problem.h"
 #include "fit/trial/trial_files.h"
 #include "fit/effect_option.h"
 #include "fit/fit.h"
@@ -218,6 +219,15 @@ PYBIND11_MODULE(_unrig, m) {
     const py::gil_scoped_release unlocked;
     const TrialResult result = run_trials(problem);
     return std::pair{to_json(result, {}, false), report(result)};
+  });
+  m.def("simulate", [](const Rig& rig, const Run& run, const std::string& fit_json, const std::string& fit_name, const std::vector<std::string>& settings, const std::string& release_load, bool jumps, bool as_recorded) {
+    SimulateOptions options;
+    options.rig = rig.file, options.run = run.file, options.fit = fit_name;
+    options.settings = settings, options.release_load = release_load, options.jumps = jumps, options.as_recorded = as_recorded;
+    std::optional<FittedRig> fit;
+    if (!fit_json.empty()) fit = read_fit(nlohmann::json::parse(fit_json), fit_name);
+    const py::gil_scoped_release unlocked;
+    return simulate(simulate_problem(rig, run, fit, options, {}).problem).run;
   });
   m.def("use_threads", &use_threads, "threads"_a, "How many threads the library may work in.");
 }

@@ -1,4 +1,5 @@
 #include "fit/simulate/simulate_command.h"
+#include "fit/simulate/simulate_problem.h"
 
 #include <fmt/format.h>
 
@@ -33,12 +34,7 @@ using Eigen::Index;
 
 constexpr const char* steady_name = "steady_normal_force";
 
-struct Options {
-  std::string rig, run, fit, output, circulation, indicial, release_load;
-  Index normal_modes = 0, torsion_modes = 0;
-  std::vector<std::string> settings, laws;
-  bool jumps = false, as_recorded = false;
-};
+using Options = SimulateOptions;
 
 IndicialFunction circulation_of(const Options& options, const std::optional<FittedRig>& fit, const std::optional<TabulatedIndicial>& table) {
   if (table && !options.circulation.empty()) throw InputError({"--wagner", 0}, "both --indicial and --wagner", "wanted one of them", "");
@@ -126,18 +122,9 @@ void take_out_noise_of_the_angle(const Rig& rig, Run& run) {
   warn(fmt::format("{}: the angle is a measurement, with a noise of {:.2g} deg; simulated is the smooth motion that it says (--as-recorded: every reading as it is)", run.file, motion->noise / degree));
 }
 
-struct ToSimulate {
-  SimulateProblem problem;
-  MadeBy made_by;
-};
+}  // namespace
 
-ToSimulate problem_of(const Options& options, const Provenance& made) {
-  Rig rig = read_rig(options.rig);
-  for (const std::string& warning : rig.warnings) warn(warning);
-  Run run = read_run(options.run);
-  for (const std::string& warning : run.warnings) warn(warning);
-  std::optional<FittedRig> fit;
-  if (!options.fit.empty()) fit = read_fit(options.fit);
+ToSimulate simulate_problem(Rig rig, Run run, const std::optional<FittedRig>& fit, const SimulateOptions& options, const Provenance& made) {
   if (fit)
     if (const std::string found = other_rig(rig, *fit); !found.empty())
       warn(rig.file + ": " + found + "; simulated is this rig with the fit's parameters, which multiply its numbers.");
@@ -173,6 +160,18 @@ ToSimulate problem_of(const Options& options, const Provenance& made) {
   if (options.jumps) problem.pitch = PitchBetweenSamples::jumps;
   if (!options.release_load.empty()) problem.release_load = quantity(options.release_load, "N", {"--release-load", 0}, "the release load");
   return {std::move(problem), made_by};
+}
+
+namespace {
+
+ToSimulate problem_of(const Options& options, const Provenance& made) {
+  Rig rig = read_rig(options.rig);
+  for (const std::string& warning : rig.warnings) warn(warning);
+  Run run = read_run(options.run);
+  for (const std::string& warning : run.warnings) warn(warning);
+  std::optional<FittedRig> fit;
+  if (!options.fit.empty()) fit = read_fit(options.fit);
+  return simulate_problem(std::move(rig), std::move(run), fit, options, made);
 }
 
 /// A recording beside its prediction, but for the zero of the channel: how far the two are apart.

@@ -1,4 +1,6 @@
 """The Python package against the program: python3 package_test.py UNRIG SAMPLE_CAMPAIGN, with the package on PYTHONPATH. Prints one line; fails by an assertion."""
+import ast
+import importlib.util
 import json
 import pathlib
 import subprocess
@@ -58,6 +60,28 @@ with tempfile.TemporaryDirectory() as folder:
     assert load.circulatory.attrs["units"] == "N" and load.attrs["run_fingerprint"] == unrig.read_run(runs[2]).fingerprint
     load.to_netcdf(folder / "load.nc") if hasattr(load, "to_netcdf") else None
 
+    # A simulation: the numbers of the program's file as far as they are printed, with a fit and without.
+    for options, given in (((), {}), (("--fit", folder / "fit.json", "--set", "normal.damping_ratio=0.01"), {"result": result, "settings": {"normal.damping_ratio": 0.01}})):
+        command("simulate", "--rig", rig, "--run", runs[2], *options, "-o", folder / "simulated.csv")
+        written, simulated = unrig.read_run(str(folder / "simulated.csv")), unrig.simulate(rig, runs[2], **given)
+        assert len(simulated) == len(written)
+        assert np.allclose(simulated["gauge"], written["gauge"], rtol=1e-6, atol=1e-6), float(np.max(np.abs(simulated["gauge"] - written["gauge"])))
+    try:
+        unrig.simulate(rig, runs[2], settings={"no_such_parameter": 1})
+        raise AssertionError("a parameter that is not there")
+    except unrig.InputError as error:
+        assert "wanted one of" in str(error)
+
+    # A fit's parameters as a data set.
+    table = result.to_dataset()
+    assert list(table.parameter.values) == list(result.params) and float(table.value.sel(parameter="normal.stiffness_scale")) == stiffness.value
+    if importlib.util.find_spec("netCDF4") or importlib.util.find_spec("scipy"):  # what xarray writes NetCDF with
+        result.to_netcdf(folder / "fit.nc")
+        with xarray.open_dataset(folder / "fit.nc") as back:
+            assert np.array_equal(back.value.values, table.value.values)
+    else:
+        print("not tried: NetCDF, for want of netCDF4 and scipy")
+
     # Arrays: the same readings give the same fit; a column is a view of the run's memory.
     pluck = unrig.read_run(runs[0])
     angle = {"alpha": (np.degrees(pluck["alpha"]), "deg")} if "alpha" in pluck.columns else {}
@@ -76,5 +100,10 @@ with tempfile.TemporaryDirectory() as folder:
             assert "wanted" in str(error), error
         else:
             raise AssertionError(wrong)
+
+# The stub names what the compiled part has, no more and no less.
+stub = ast.parse((pathlib.Path(unrig.__file__).parent / "_unrig.pyi").read_text())
+named = {node.name for node in stub.body if isinstance(node, (ast.ClassDef, ast.FunctionDef))}
+assert named == {name for name in dir(unrig._unrig) if not name.startswith("_")}, named ^ {name for name in dir(unrig._unrig) if not name.startswith("_")}
 
 print("the Python package agrees with the program")

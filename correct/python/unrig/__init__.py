@@ -14,7 +14,7 @@ Everything is in SI units and radians. What cannot be used raises `InputError` (
 from ._unrig import InputError, NoAnswer, Rig, Run, __version__, use_threads
 from .inputs import read_rig, read_run, run_from_arrays, run_from_dataframe
 from .results import ApparentMassResult, Diagnosis, FitResult, Parameter, TrialResult
-from .verbs import apparent_mass, correct, diagnose, fit, trial
+from .verbs import apparent_mass, correct, diagnose, fit, simulate, trial
 
 __all__ = ["ApparentMassResult", "Diagnosis", "FitResult", "InputError", "NoAnswer", "Parameter", "Rig", "Run", "TrialResult", "__version__", "apparent_mass", "correct", "diagnose", "fit",
-           "read_rig", "read_run", "run_from_arrays", "run_from_dataframe", "trial", "use_threads"]
+           "read_rig", "read_run", "run_from_arrays", "run_from_dataframe", "simulate", "trial", "use_threads"]

@@ -123,6 +123,20 @@ class FitResult(Result):
         trouble = f"<p><b>No trustworthy answer:</b> {html.escape(self.no_answer)}</p>" if self.no_answer else ""
         return f"{trouble}<p>reduced chi-square {self.redchi:.5g}</p><table><tr>{head}</tr>{''.join(row(p) for p in self.params.values())}</table>"
 
+    def to_dataset(self):
+        """The parameters as an xarray.Dataset over `parameter`, in SI; covariance over `parameter` and `parameter_2`."""
+        import xarray
+        parameters = list(self.params.values())
+        along = {name: ("parameter", [getattr(p, name) for p in parameters]) for name in ("value", "stderr", "unit", "init_value")}
+        along["identified"] = ("parameter", [int(p.identified) for p in parameters])
+        along["covariance"] = (("parameter", "parameter_2"), self.covar)
+        names = list(self.params)
+        return xarray.Dataset(along, {"parameter": names, "parameter_2": names}, {"reduced_chi2": self.redchi, "bic": self.bic, "no_answer": self.no_answer})
+
+    def to_netcdf(self, path) -> None:
+        """Writes `to_dataset()` as a NetCDF file."""
+        self.to_dataset().to_netcdf(path)
+
     def plot(self, ax=None):
         """Residual over noise of each run's channels; needs matplotlib. Returns the axes."""
         import matplotlib.pyplot as plt

@@ -25,6 +25,28 @@ def fit(rig: Union[Path, Rig], runs: Iterable[Union[Path, Run]], effects: Sequen
     return FitResult(_unrig.fit(as_rig(rig), [as_run(run) for run in runs], list(effects), [str(law) for law in laws], dict(start), list(profile), progress))
 
 
+def text_of_fit(result: Union[Path, FitResult]) -> tuple[str, str]:
+    """A fit as JSON text, and what messages call it."""
+    if isinstance(result, FitResult):
+        return result.json, "fit"
+    name = os.fspath(result)
+    with open(name, encoding="utf-8") as file:
+        return file.read(), name
+
+
+def simulate(rig: Union[Path, Rig], run: Union[Path, Run], *, result: Union[Path, FitResult, None] = None, settings: Mapping[str, float] = {}, release_load: Optional[float] = None, jumps: bool = False,
+             as_recorded: bool = False) -> Run:
+    """What gauge and sensors read in a motion, as `unrig simulate`: a run with its columns in SI.
+
+    result: a fit, or the path of its fit.json. settings: values of model parameters in SI, by name.
+    release_load: load at the calibration element that a pluck is released from [N].
+    jumps: the angle jumps between samples. as_recorded: the angle with its noise.
+    """
+    text, name = ("", "") if result is None else text_of_fit(result)
+    load = "" if release_load is None else f"{float(release_load)!r} N"
+    return _unrig.simulate(as_rig(rig), as_run(run), text, name, [f"{key}={float(value)!r}" for key, value in settings.items()], load, jumps, as_recorded)
+
+
 def correct(rig: Union[Path, Rig], result: Union[Path, FitResult], run: Union[Path, Run], *, calibration_error: float = 0.0, monotone: bool = False, at_step: Optional[float] = None):
     """The load of a rigid rig out of a gauge record, as `unrig correct`: an xarray.Dataset.
 
@@ -34,12 +56,7 @@ def correct(rig: Union[Path, Rig], result: Union[Path, FitResult], run: Union[Pa
     """
     import xarray
     rig, run = as_rig(rig), as_run(run)
-    if isinstance(result, FitResult):
-        text, name = result.json, "fit"
-    else:
-        name = os.fspath(result)
-        with open(name, encoding="utf-8") as file:
-            text = file.read()
+    text, name = text_of_fit(result)
     r = _unrig.correct(rig, text, name, run, calibration_error, monotone, at_step)
     time = r["start"] + r["dt"] * np.arange(len(r["gauge"]))
     attrs = {"rig": rig.file, "run": run.file, "fit": name, "unrig_version": _unrig.__version__, "run_fingerprint": run.fingerprint, "no_answer": r["no_answer"], "warnings": "\n".join(r["warnings"]),
