@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <numbers>
 #include <random>
@@ -32,27 +33,43 @@ VectorXd wandering(Index samples, double dt, unsigned seed) {
   return noise;
 }
 
-/// Bands that take the noise for white hold in 38 % of these samples; generalised least squares knows what wanders.
+/// A run of the null campaign with such noise on top of its own.
+unrig::Run noisy_run(const std::string& name, unsigned seed) {
+  unrig::Run run = read_run(test::null_campaign(name + ".csv"));
+  Channel& gauge = *std::find_if(run.channels.begin(), run.channels.end(), [](const Channel& c) { return c.name == "gauge"; });
+  gauge.value += wandering(gauge.value.size(), run.dt, seed);
+  return run;
+}
+
+/// Bands that take the noise for white hold in a third of these samples. Five runs together show what wanders, and the correction of each knows it from their fit.
 TEST(ColouredNoise, IsInTheBandOfTheLoad) {
   double held = 0, samples = 0;
-  for (const std::string name : {"step_a", "step_b", "step_c"})
-    for (const unsigned seed : {1u, 2u, 3u, 4u}) {
-      CorrectProblem problem = test::null_problem(name);
-      Channel& gauge = *std::find_if(problem.run.channels.begin(), problem.run.channels.end(), [](const Channel& c) { return c.name == "gauge"; });
-      gauge.value += wandering(gauge.value.size(), problem.run.dt, seed);
-      const CorrectResult result = correct(problem);
+  for (const unsigned seed : {1u, 2u}) {
+    FitProblem fitted;
+    fitted.rig = test::null_rig();
+    unsigned run_seed = 10 * seed;
+    for (const std::string name : {"dry_pluck", "wet_pluck", "step_a", "step_b", "step_c"}) fitted.runs.push_back(noisy_run(name, run_seed++));
+    const FitResult result_of_fit = fit(fitted);
+    ASSERT_EQ(result_of_fit.noise_colour.size(), 1u);
+    EXPECT_EQ(result_of_fit.noise_colour.front().channel, "gauge");
+    const test::TemporaryDirectory directory;
+    const FittedRig known = read_fit(directory.file("fit.json", to_json(result_of_fit)));
+    for (const std::size_t step : {2u, 3u, 4u}) {
+      const CorrectResult result = correct({fitted.rig, known, fitted.runs[step], 0});
+      const std::string name = std::array{"", "", "step_a", "step_b", "step_c"}[step];
       EXPECT_NEAR(result.reduced_chi2, 1, 0.08) << name << ", " << seed;
       EXPECT_THAT(result.warnings, testing::Contains(testing::HasSubstr("coloured")));
       const VectorXd truth = test::column_of(test::null_campaign("truth_" + name + ".csv"), "circulatory");
       for (Index k = 0; k < truth.size(); ++k) {
-        const double semichords = (problem.run.time(k) - true_onset) * result.semichords_per_second;
+        const double semichords = (fitted.runs[step].time(k) - true_onset) * result.semichords_per_second;
         if (semichords < 0.5 || semichords > 8) continue;
         ++samples;
         held += std::abs(result.circulatory.value[k] - truth[k]) <= 1.96 * result.circulatory.std[k] ? 1 : 0;
       }
     }
-  // The errors of one run are one error: of twelve runs, each within its band in 95 of 100, three outside happen once in fifty.
-  EXPECT_GT(held / samples, 0.8);
+  }
+  // The errors of one run are one error: of six runs, each within its band in 95 of 100, two outside happen once in thirty.
+  EXPECT_GT(held / samples, 0.66);
 }
 
 TEST(ColouredNoise, IsNotSeenWhereItIsWhite) {
