@@ -12,4 +12,28 @@ for command in $(echo "$help" | sed -n 's/^  \([a-z][a-z-]*\) .*/\1/p'); do
   printf '.SH unrig %s\n' "$(echo "$command" | sed 's/-/\\-/g')"
   "$unrig" "$command" --help | verbatim
 done
+printf '.SH FILES\n'
+verbatim << 'FILES'
+run.csv     one recording: meta data in lines that begin with "# ", a row of names with units, numbers
+rig.toml    one structure: section, elements with mass and flexibility, gauge; or its modes
+fit.json, apparent.json, diagnosis.json, trial.json, check.json     results
+corrected.csv, indicial.csv, simulated.csv                          results in columns
+law.toml    a law of one's own
+FILES
+printf 'Their formats: share/doc/unrig/manual/run_files.md, rig_files.md, laws.md, results.md.\n'
+printf '.SH EXIT STATUS\n'
+verbatim << 'STATUS'
+0    done; warnings, if there are any, on standard error
+1    the question has no trustworthy answer; why is said
+2    wrong use, or input that cannot be used
+130  interrupted; nothing is half-written
+STATUS
+printf '.SH EXAMPLES\n'
+verbatim << 'EXAMPLES'
+unrig check --rig rig.toml dry_pluck.csv wet_pluck.csv step_a.csv
+unrig fit --rig rig.toml dry_pluck.csv wet_pluck.csv step_a.csv -o fit.json
+unrig correct --rig rig.toml --fit fit.json step_a.csv -o corrected.csv --indicial indicial.csv
+unrig diagnose --rig rig.toml dry_pluck.csv wet_pluck.csv step_a.csv -o diagnosis.json
+unrig report fit.json corrected.csv -o report.html
+EXAMPLES
 printf '.SH SEE ALSO\nshare/doc/unrig/manual: run files, rig files, results and verdicts, effects, method, library.\n'
