@@ -1,9 +1,14 @@
+#include <fcntl.h>
+#include <unistd.h>
+
 #include <algorithm>
 #include <cstdio>
 #include <exception>
+#include <filesystem>
 #include <iterator>
 #include <new>
 #include <string>
+#include <system_error>
 #include <vector>
 
 #include "core/files/command.h"
@@ -11,6 +16,8 @@
 #include "core/import/import_command.h"
 #include "core/files/last_progress.h"
 #include "core/files/near_word.h"
+#include "core/files/text_file.h"
+#include "core/files/verbosity.h"
 #include "correct/correct_command.h"
 #include "correct/report/report_command.h"
 #include "fit/apparent_mass/apparent_mass_command.h"
@@ -40,7 +47,8 @@ void print_help(std::FILE* stream) {
   std::fputs("unrig: take the rig out of the reading\n\nusage: unrig COMMAND [OPTIONS]\n\n", stream);
   for (const unrig::Command& command : commands) std::fprintf(stream, "  %-14s %s\n", command.name, command.summary);
   std::fputs(R"(
-`unrig help COMMAND` explains a command. Exit status: 0 done, 1 no trustworthy answer, 2 wrong use or unusable input.
+`unrig help COMMAND` explains a command. With every command: --quiet (no summary, warnings or progress), --verbose (every step a line), --json
+(what -o writes on standard output too, in place of the summary). Exit status: 0 done, 1 no trustworthy answer, 2 wrong use or unusable input.
 
 From the recordings of one rig to a page to look at:
     unrig fit      --rig rig.toml dry_pluck.csv wet_pluck.csv step_a.csv -o fit.json
@@ -96,6 +104,48 @@ int run(const unrig::Command& command, int argc, char** argv) {
   }
 }
 
+/// Runs a command without the options that are every command's: what of them is asked for is done here.
+int run_as_told(const unrig::Command& command, int argc, char** argv) {
+  bool quiet = false, as_json = false;
+  std::string output;
+  std::vector<char*> words;
+  for (int i = 0; i < argc; ++i) {
+    const std::string word = argv[i];
+    if (word == "--quiet") quiet = true;
+    else if (word == "--verbose") unrig::set_verbosity(unrig::Verbosity::verbose);
+    else if (word == "--json") as_json = true;
+    else words.push_back(argv[i]);
+    if ((word == "-o" || word == "--output") && i + 1 < argc) output = argv[i + 1];
+    if (word.starts_with("--output=")) output = word.substr(std::string("--output=").size());
+  }
+  if (quiet) unrig::set_verbosity(unrig::Verbosity::quiet);
+  if (as_json && !output.ends_with(".json")) {
+    std::fprintf(stderr, "unrig %s: --json with %s; wanted -o FILE.json: of a result in columns give the file\n", command.name, output.empty() ? "no -o" : ("-o " + output).c_str());
+    return unrig::exit_wrong_use;
+  }
+  const auto count = static_cast<int>(words.size());
+  words.push_back(nullptr);
+  if (!quiet && !as_json) return run(command, count, words.data());
+  const auto written = [&] {
+    std::error_code none;
+    return std::filesystem::last_write_time(output, none);
+  };
+  const auto before = written();
+  std::fflush(stdout);
+  const int out = dup(STDOUT_FILENO), nowhere = open("/dev/null", O_WRONLY);
+  dup2(nowhere, STDOUT_FILENO);
+  close(nowhere);
+  const int status = run(command, count, words.data());
+  std::fflush(stdout);
+  dup2(out, STDOUT_FILENO);
+  close(out);
+  if (as_json && std::filesystem::exists(output) && written() != before) {
+    const std::string text = unrig::read_text(output);
+    std::fwrite(text.data(), 1, text.size(), stdout);
+  }
+  return status;
+}
+
 const unrig::Command* command_called(const std::string& name) {
   const auto found = std::find_if(std::begin(commands), std::end(commands), [&](const unrig::Command& command) { return name == command.name; });
   return found == std::end(commands) ? nullptr : found;
@@ -135,6 +185,6 @@ int main(int argc, char** argv) {
     std::puts("unrig " UNRIG_VERSION);
     return unrig::exit_done;
   }
-  if (const unrig::Command* const command = command_called(first)) return run(*command, argc - 1, argv + 1);
+  if (const unrig::Command* const command = command_called(first)) return run_as_told(*command, argc - 1, argv + 1);
   return no_such_command(first);
 }

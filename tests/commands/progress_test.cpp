@@ -3,6 +3,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <sys/wait.h>
+
 #include <cstdlib>
 
 #include "core/files/text_file.h"
@@ -43,6 +45,45 @@ TEST(Progress, IsSeenOnATerminalAndGoneAtTheEnd) {
     EXPECT_THAT(read_text(err), Not(HasSubstr(" ..."))) << command;
     EXPECT_THAT(read_text(err), Not(HasSubstr("\033"))) << command;
   }
+}
+
+/// What a call writes on standard output and standard error.
+struct Said {
+  int status;
+  std::string out, err;
+};
+
+Said said(const TemporaryDirectory& directory, const std::string& arguments) {
+  const std::string out = directory.path("out"), err = directory.path("err");
+  const int status = std::system((unrig_binary() + " " + arguments + " >" + out + " 2>" + err).c_str());
+  return {WEXITSTATUS(status), read_text(out), read_text(err)};
+}
+
+TEST(Manners, QuietVerboseAndJson) {
+  const TemporaryDirectory directory;
+  const std::string fit = directory.path("fit.json"), arguments = "fit --rig " + null_campaign("rig.toml") + " " + null_campaign("dry_pluck.csv") + " -o " + fit;
+  const Said plain = said(directory, arguments);
+  EXPECT_EQ(plain.status, 0);
+  EXPECT_THAT(plain.out, HasSubstr("[[Variables]]"));
+  EXPECT_THAT(plain.err, testing::AllOf(HasSubstr("warning: "), Not(HasSubstr("progress: "))));
+
+  const Said quiet = said(directory, arguments + " --quiet");
+  EXPECT_EQ(quiet.status, 0);
+  EXPECT_EQ(quiet.out + quiet.err, "");
+
+  EXPECT_THAT(said(directory, arguments + " --verbose").err, HasSubstr("progress: "));
+
+  const Said json = said(directory, arguments + " --json");
+  EXPECT_EQ(json.out, read_text(fit));
+  EXPECT_THAT(json.err, HasSubstr("warning: "));
+
+  // Where nothing was written there is nothing to print, an older result least of all.
+  const Said refused = said(directory, "fit --rig " + null_campaign("rig.toml") + " " + directory.path("none.csv") + " -o " + fit + " --json");
+  EXPECT_EQ(refused.status, 2);
+  EXPECT_EQ(refused.out, "");
+  const Said columns = said(directory, "correct --json -o " + directory.path("c.csv"));
+  EXPECT_EQ(columns.status, 2);
+  EXPECT_THAT(columns.err, HasSubstr("FILE.json"));
 }
 
 }  // namespace
