@@ -31,9 +31,12 @@ Trial leaving(const Trial& like, std::vector<std::string> effects, double power)
 }
 
 Trial two_runs() {
-  FitProblem problem;
-  problem.rig = read_rig(test::null_campaign("rig.toml"));
-  for (const char* run : {"dry_pluck", "wet_pluck"}) problem.runs.push_back(read_run(test::null_campaign(std::string(run) + ".csv")));
+  static const FitProblem problem = [] {  // the trial refers to its runs
+    FitProblem of_two;
+    of_two.rig = read_rig(test::null_campaign("rig.toml"));
+    for (const char* run : {"dry_pluck", "wet_pluck"}) of_two.runs.push_back(read_run(test::null_campaign(std::string(run) + ".csv")));
+    return of_two;
+  }();
   return fit_baseline(problem);
 }
 
