@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
-#include <filesystem>
 #include <limits>
 #include <numbers>
 #include <optional>
@@ -14,6 +13,7 @@
 #include "core/check/run_estimate.h"
 #include "core/check/waveform_gate.h"
 #include "core/files/error.h"
+#include "core/files/text_file.h"
 #include "core/run/run_limits.h"
 
 namespace unrig {
@@ -28,7 +28,7 @@ using std::numbers::pi;
 //   steady load             -0.10 +- 0.09 (2 to 4 degrees), -0.04 +- 0.16 (25 degrees); least -0.60
 //   ringing                 0.0 +- 0.35, friction and noise lower it to -2.1
 //
-// Widths are two to three times these, for rigs and wings unlike the samples: stiffness known to 35 %, apparent mass to 25 %, slope to 35 % (a wing of aspect ratio 5 has 70 % of 2 pi).
+// Widths are two to three times these, for rigs and wings unlike the samples: stiffness known to 35 %, apparent mass to 15 %, slope to 35 % (a wing of aspect ratio 5 has 70 % of 2 pi).
 struct Width {
   double mean, shared, own, cap;
 };
@@ -180,8 +180,6 @@ class Campaign {
   bool decays_ = false;
 };
 
-std::string short_name(const std::string& path) { return std::filesystem::path(path).filename().string(); }
-
 /// A slip that was tried.
 struct Trial {
   const Cause* cause;
@@ -210,11 +208,11 @@ std::vector<Trial> all_trials(const Rig& rig, const Campaign& campaign) {
 }
 
 std::string where(const Trial& trial, const Rig& rig, const std::vector<Run>& runs) {
-  if (trial.runs.empty()) return short_name(rig.file);
-  if (trial.runs.size() == 1) return short_name(runs[trial.runs.front()].file);
+  if (trial.runs.empty()) return base_name(rig.file);
+  if (trial.runs.size() == 1) return base_name(runs[trial.runs.front()].file);
   if (trial.runs.size() == runs.size()) return "all runs";
   std::string names;
-  for (const std::size_t r : trial.runs) names += (names.empty() ? "" : ", ") + short_name(runs[r].file);
+  for (const std::size_t r : trial.runs) names += (names.empty() ? "" : ", ") + base_name(runs[r].file);
   return names;
 }
 
@@ -280,7 +278,7 @@ void look_at_readings(const Run& run, std::vector<Suspicion>& found) {
   for (const Channel& channel : run.channels) {
     if (channel.name != "gauge") continue;
     const auto tell = [&](std::size_t count, const std::string& what, bool grave) {
-      found.push_back({short_name(run.file), {what}, static_cast<double>(count), 0, grave, fmt::format("{}: {} of {} readings of the {} {}", short_name(run.file), count, channel.value.size(), channel.name, what)});
+      found.push_back({base_name(run.file), {what}, static_cast<double>(count), 0, grave, fmt::format("{}: {} of {} readings of the {} {}", base_name(run.file), count, channel.value.size(), channel.name, what)});
     };
     if (channel.clipped > 0) tell(channel.clipped, "are clipped at the end of its range; they are left out. Lower the gain of the amplifier.", false);
     constexpr std::size_t noteworthy = 4;  // noise with heavy tails has one or two in a record of the samples

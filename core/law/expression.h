@@ -111,7 +111,4 @@ struct Expression::Split {
   Expression rest, factor;
 };
 
-/// The name among `known` that differs least from `name`, by two letters at most; empty where none does.
-std::string nearest_name(std::string_view name, const std::vector<std::string>& known);
-
 }  // namespace unrig

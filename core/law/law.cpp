@@ -8,6 +8,7 @@
 #include <fmt/ranges.h>
 
 #include "core/propagate/feedback_force.h"
+#include "core/files/near_word.h"
 #include "core/files/text_file.h"
 #include "core/files/toml_table.h"
 #include "core/files/units.h"
@@ -105,7 +106,7 @@ std::vector<Parameter> read_parameters(const TomlTable& file, const std::vector<
     if (std::find(symbol_names.begin(), symbol_names.end(), name) != symbol_names.end()) table.fail(name, fmt::format("the symbol {} stands in [parameters]", name), "wanted another name for a parameter");
     if (Expression::is_function(name)) table.fail(name, fmt::format("the function {} stands in [parameters]", name), "wanted another name for a parameter");
     if (std::find(used.begin(), used.end(), name) == used.end()) {
-      const std::string nearest = nearest_name(name, used);
+      const std::string nearest = nearest_word(name, used);
       table.fail(name, fmt::format("the parameter {} is not used", name), "wanted it in `force` or `memory`", nearest.empty() ? "Leave it out." : fmt::format("There is {}.", nearest));
     }
   }

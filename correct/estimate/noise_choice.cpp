@@ -40,7 +40,8 @@ void choose_colour(RunInLegs& legs, Search& search, const std::vector<ChannelCol
     legs = std::move(coloured);
     return true;
   };
-  if (const Colours common = white.residual(0).colours(search.solution.theta, expected); !expected.empty() && any(common)) consider(common, 0);
+  if (!expected.empty())
+    if (const Colours common = white.residual(0).colours(search.solution.theta, expected); any(common)) consider(common, 0);
   const auto consider_its_own = [&] {
     const Colours own = legs.residual(0).colours(search.solution.theta, {});
     return any(own) && consider(own, cost_of(own, readings));

@@ -20,6 +20,7 @@ VectorXd RunResidual::at_rest(VectorXd left, const VectorXd& weight) const {
     if (phase.moving) left.segment(phase.samples.first, phase.samples.length()).setConstant(std::nan(""));
   return left;
 }
+
 bool RunResidual::may_be_coloured(const VectorXd& theta) const {
   const bool goes_on = arrival_.rows() > 0, driven = inputs_.cols() > 0;
   return !goes_on && !driven && model_->system(conditions_, theta, channels_).feedback.empty();
@@ -42,7 +43,6 @@ void RunResidual::set_colours(const VectorXd& theta, const Colours& colours) {
   const Prediction p = predict(theta);
   colour_ = colours;
   whitened_ = (weight_.array() > 0).select(measured_, p.output);  // left-out readings have no innovation of their own
-  Index f = 0;
   for (std::size_t c = 0; c < channels_.size(); ++c) {
     if (!colour_[c]) continue;
     const WhiteningFilter filter(*colour_[c], run_->dt);
@@ -50,9 +50,7 @@ void RunResidual::set_colours(const VectorXd& theta, const Colours& colours) {
     weight_.col(column) *= sigma_[c] / filter.sigma();
     sigma_[c] = filter.sigma();
     whitened_.col(column) = filter.filtered(whitened_.col(column));
-    ++f;
   }
-  if (f == 0) whitened_.resize(0, 0);
   take_colour(*this);
 }
 

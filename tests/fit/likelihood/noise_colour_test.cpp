@@ -68,6 +68,7 @@ TEST(WhiteningFilter, SaysWhatTheWholeCovarianceSays) {
     right << filter.filtered(y) / filter.sigma(), filter.start_information() * filter.settled() * y[0];
     const VectorXd u = rows.colPivHouseholderQr().solve(right);
     const double chi2 = (right - rows * u).squaredNorm();
+    // The filter's gain is steady to 1e-13, and the start's covariance is cut at 1e-10 of its largest.
     EXPECT_NEAR(chi2, root.matrixL().solve(y).squaredNorm(), 1e-6 * chi2);
     // -2 log of the density: n log s^2, the start's prior, and what the readings say of the start.
     const double determinant = 2 * static_cast<double>(n) * std::log(filter.sigma() / filter.gain()) - 2 * filter.log_start_information() + std::log((rows.transpose() * rows).determinant());
@@ -104,6 +105,7 @@ TEST(NoiseColour, IsFoundWithItsSize) {
     one.segment(2000, 300).setConstant(std::nan(""));  // the shaft moves
     const std::optional<NoiseColour> found = colour_of({{one, dt}, {other, dt}});
     ASSERT_TRUE(found) << seed;
+    // Below 1 Hz some ten lines tell it, each to 100 %: 30 %.
     for (const double f : {0.5, 2.0, 10.0, 50.0, 200.0}) EXPECT_NEAR(std::log(spectrum(*found, f) / spectrum(truth, f)), 0, 0.5) << seed << " at " << f << " Hz";
     EXPECT_NEAR(std::log(spectrum(*found, 200) / spectrum(truth, 200)), 0, 0.08) << "thousands of lines";
   }
