@@ -116,6 +116,7 @@ int run_as_told(const unrig::Command& command, int argc, char** argv) {
     else if (word == "--json") as_json = true;
     else words.push_back(argv[i]);
     if ((word == "-o" || word == "--output") && i + 1 < argc) output = argv[i + 1];
+    if (word.starts_with("-o") && word.size() > 2) output = word.substr(2);
     if (word.starts_with("--output=")) output = word.substr(std::string("--output=").size());
   }
   if (quiet) unrig::set_verbosity(unrig::Verbosity::quiet);

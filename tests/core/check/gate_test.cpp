@@ -35,6 +35,7 @@ std::vector<std::string> folders_with_a_rig(const std::string& root) {
   for (const auto& entry : std::filesystem::directory_iterator(root))
     if (std::filesystem::exists(entry.path() / "rig.toml")) folders.push_back(entry.path().string());
   std::sort(folders.begin(), folders.end());
+  EXPECT_FALSE(folders.empty()) << root << ": nothing was looked at";
   return folders;
 }
 
