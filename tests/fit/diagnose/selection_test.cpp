@@ -9,6 +9,7 @@
 #include "core/model/simulate.h"
 #include "fit/diagnose/diagnose.h"
 #include "fit/trial/trial_campaign.h"
+#include "tests/support/long_tests.h"
 #include "tests/support/sample_data.h"
 
 namespace unrig {
@@ -51,8 +52,16 @@ const Candidate* tried(const Diagnosis& d, const Strings& effects) {
   return place == d.ranking.end() ? nullptr : &*place;
 }
 
+/// Minutes of search for one campaign each, and under the sanitizers ten times that: on request.
+class LongSelection : public testing::Test {
+ protected:
+  void SetUp() override {
+    if (!test::long_tests_wanted()) GTEST_SKIP() << "takes minutes; UNRIG_LONG=1 asks for it";
+  }
+};
+
 /// A drag and a spring of much the same size. A wave with an amplitude for every run comes first, and the spring beside it leaves little; only in the wave's place does the drag come in.
-TEST(Selection, TheFirstToBeFoundIsExchangedForWhatItStoodInFor) {
+TEST_F(LongSelection, TheFirstToBeFoundIsExchangedForWhatItStoodInFor) {
   const TrialCampaign campaign = pair(3002, 5, {"quadratic-drag", "cubic-stiffness"}, false);
   ASSERT_GT(campaign.sizes[0], 30);
   ASSERT_GT(campaign.sizes[1], 30);
@@ -74,7 +83,7 @@ TEST(Selection, ALawThatWasLostFarAwayIsTriedAgainNearTheData) {
 }
 
 /// The delay that comes first leaves what a filter leaves; with both at work the filter does nearly all, and rests at a limit because of the delay.
-TEST(Selection, WhatRestsAtALimitMayDoTheWorkOfTheEffectBeforeIt) {
+TEST_F(LongSelection, WhatRestsAtALimitMayDoTheWorkOfTheEffectBeforeIt) {
   const TrialCampaign campaign = pair(3502, 28, {"torsion-crosstalk", "gauge-lowpass"}, false);
   ASSERT_LT(campaign.sizes[0], 1) << "below the noise";
   const Diagnosis d = verdict_on(campaign, {"channel-delay", "gauge-lowpass", "tank-wave", "gauge-drift", "mains-hum", "separation-lag", "wagner-lag", "torsion-crosstalk"});  // so many that not all are fitted
@@ -102,7 +111,7 @@ TEST(Selection, WhatIsLeftOfALawIsGivenNoNameThatDoesNotExplainIt) {
 }
 
 /// Friction of 1.5 N that changes its sign within 0.16 mm/s: followed in whole samples it leaves 1.27 and 1.13 times the noise of the two decays, measured.
-TEST(Selection, SharpFrictionIsFollowedInFinerSteps) {
+TEST_F(LongSelection, SharpFrictionIsFollowedInFinerSteps) {
   const Rig rig = read_rig(test::null_campaign("rig.toml"));
   const AeroelasticModel model = AeroelasticModel(rig, make_basis(rig, 1000, 998.2), wagner(Wagner::within_1e6)).with_effects({"coulomb-friction"});
   std::mt19937_64 random(1);
@@ -127,7 +136,7 @@ TEST(Selection, SharpFrictionIsFollowedInFinerSteps) {
 }
 
 /// The decays cross the corners for seconds, and are explained by a law that is trusted to within some per cent; the steps are followed to the noise from what the decays tell.
-TEST(Selection, StepsOfARigWithAGapAreFollowedToTheNoise) {
+TEST_F(LongSelection, StepsOfARigWithAGapAreFollowedToTheNoise) {
   const Diagnosis d = verdict_on(pair(3902, 5, {"freeplay"}, true), {"freeplay", "coulomb-friction", "wagner-lag"});
   EXPECT_THAT(found_in(d), UnorderedElementsAre("freeplay"));
   EXPECT_FALSE(d.unexplained) << d.remaining.summary;
