@@ -176,6 +176,7 @@ FitResult describe_fit(Arrival& arrival, const FitProblem& problem, Settle first
   }
   describe_profiles(joint, uncertainty, problem, result);
   judge_answer(result);
+  judge_misfit(joint, uncertainty, result);
   refuse_unfitted_modes(joint, result);
   warn_of_silent_runs(joint, result);
   warn_of_mismatch(result);

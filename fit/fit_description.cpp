@@ -129,7 +129,7 @@ FittedRun describe_run(const RunResidual& residual, const VectorXd& theta, doubl
   };
   for (std::size_t c = 0; c < p.channels.size(); ++c) {
     const VectorXd predicted = p.output.col(static_cast<Index>(c));
-    add(p.channels[c], predicted, residual.channel_weight(c), std::hypot(residual.sigma(c), sigma_of_inputs(residual, theta, c)));
+    add(p.channels[c], predicted, residual.channel_weight(c), std::hypot(residual.noise(c), sigma_of_inputs(residual, theta, c)));
     fitted.followed = std::min(fitted.followed, share_followed(run.channel(p.channels[c]).value, predicted, residual.channel_weight(c)));
   }
   if (p.motion.angle.size() > 0) {
@@ -146,7 +146,7 @@ std::vector<ChannelColour> noise_colours(const JointProblem& joint) {
     const RunResidual::Prediction p = run.predict(joint.theta(r));
     for (std::size_t c = 0; c < p.channels.size() && !run.is_aside(); ++c) {
       if (sigma_of_inputs(run, joint.theta(r), c) > 0) continue;  // coloured by what drives the rig
-      const VectorXd residual = (run.run().channel(p.channels[c]).value - p.output.col(static_cast<Index>(c))) / run.sigma(c);
+      const VectorXd residual = (run.run().channel(p.channels[c]).value - p.output.col(static_cast<Index>(c))) / run.noise(c);
       left[p.channels[c]].push_back({run.at_rest(residual, run.channel_weight(c)), run.run().dt});
     }
   }
@@ -238,6 +238,18 @@ void describe_profiles(const JointProblem& joint, const ParameterUncertainty& un
   }
 }
 
+namespace {
+
+void identify_nothing(FitResult& result, const std::string& advice) {
+  for (FittedParameter& p : result.parameters) {
+    if (!p.identified) continue;
+    p.identified = false;
+    p.advice = advice;
+  }
+}
+
+}  // namespace
+
 void judge_answer(FitResult& result) {
   constexpr double half = 0.5;
   const auto known = [](const FittedParameter& p) { return p.identified; };
@@ -261,12 +273,25 @@ void judge_answer(FitResult& result) {
       }
     return;
   }
-  if (result.no_answer.empty()) return;
-  for (FittedParameter& p : result.parameters) {
-    if (!p.identified) continue;
-    p.identified = false;
-    p.advice = advice;
+  if (!result.no_answer.empty()) identify_nothing(result, advice);
+}
+
+void judge_misfit(const JointProblem& joint, const ParameterUncertainty& uncertainty, FitResult& result) {
+  constexpr double significant = 1e-3;
+  if (!result.no_answer.empty() || std::all_of(result.runs.begin(), result.runs.end(), [](const FittedRun& run) { return run.explained() || run.aside; })) return;
+  double least = significant / static_cast<double>(uncertainty.free.size());
+  std::string moved;
+  for (std::size_t a = 0; a < uncertainty.free.size(); ++a) {
+    const auto which = static_cast<std::size_t>(uncertainty.free[a]);
+    const FittedParameter& p = result.parameters[which];
+    const double by = uncertainty.earlier_half[static_cast<Index>(a)], chance = std::erfc(std::abs(by) / p.std_error / std::sqrt(2.0));
+    if (!p.identified || !(chance < least)) continue;
+    least = chance;
+    moved = fmt::format("{} = {:.5g} +/- {:.2g} {}, and about {:.5g} by the earlier halves of the runs alone", short_name(joint, joint.unknowns()[which]), p.value, p.std_error, p.unit, p.value + by);
   }
+  if (moved.empty()) return;
+  result.no_answer = "what the model leaves unexplained moves its parameters by more than their errors: " + moved + ". Something is missing from the model that goes with the swing or with time. Ask `unrig diagnose` what it is.";
+  identify_nothing(result, "What the model leaves unexplained moves the parameters by more than their errors. Ask `unrig diagnose` what is missing.");
 }
 
 void warn_of_silent_runs(const JointProblem& joint, FitResult& result) {

@@ -50,4 +50,8 @@ void warn_of_silent_runs(const JointProblem& joint, FitResult& result);
 /// Warns of every run that the model does not explain to its noise: the error bars cannot tell how far that takes the parameters.
 void warn_of_mismatch(FitResult& result);
 
+/// No answer where some run is left with more than its noise and that moves a parameter: where the earlier halves of the runs alone would have it further off than noise of the residual's own colour moves
+/// it in one of a thousand fits (ParameterUncertainty::earlier_half). Noise, of whatever colour, goes on alike; what a model lacks goes with the swing or the time.
+void judge_misfit(const JointProblem& joint, const ParameterUncertainty& uncertainty, FitResult& result);
+
 }  // namespace unrig

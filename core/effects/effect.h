@@ -77,9 +77,10 @@ struct Effect {
   bool enriches_basis = false;  ///< on a beam its model has all modes below the Nyquist frequency, in place of the number in the rig file
   bool in_the_load = false;     ///< it changes the load that a rigid rig would feel, which `correct` must not take out
   Needs needs = Needs::any_rig;
-  /// Why `unrig diagnose` tries it only where it is named; empty: wherever it acts. The second is for rigs known only as modes.
-  std::string only_if_named = {}, only_if_named_on_modes = {};
-  const std::string& why_only_named(const Rig& rig) const { return rig.is_modal() && only_if_named.empty() ? only_if_named_on_modes : only_if_named; }
+  /// Why `unrig diagnose` tries it only where it is named; empty: wherever it acts.
+  std::string only_if_named = {};
+  /// Whether, with these parameters of the model, it is something of its own beside what the model has without it. Without it it always is.
+  std::function<bool(const AeroelasticModel&, const Eigen::VectorXd& theta)> distinct = {};
 };
 
 /// "carriage-vibration needs a run in a stream": why it acts in none of these runs of the rig; empty if it does in one.

@@ -1,4 +1,7 @@
+#include <cmath>
 #include <numbers>
+
+#include <fmt/format.h>
 
 #include "core/effects/list.h"
 
@@ -33,6 +36,18 @@ void append_mode(LinearSystem& system, const EffectContext& c) {
   system.settling.insert(system.settling.end(), {q, v});
 }
 
+/// Whether its half-power bandwidth, 2 zeta f, and that of each known mode leave each other free: |f - f_i| > zeta f + zeta_i f_i. Modes that overlap make one peak, by which damping and stiffness that change
+/// with amplitude pass for two. Source: R. H. Lyon, R. G. DeJong, Theory and Application of Statistical Energy Analysis (1995), modal overlap.
+bool stands_apart(const AeroelasticModel& model, const Eigen::VectorXd& theta) {
+  const double f = theta[model.index("higher-mode.frequency")], half_width = theta[model.index("higher-mode.damping_ratio")] * f;
+  for (std::size_t i = 0; i < model.rig().modal.size(); ++i) {
+    const auto known = [&](const char* what) { return theta[model.index(fmt::format("modal[{}].{}", i + 1, what))]; };
+    const double mass = known("mass"), f_i = std::sqrt(known("stiffness") / mass) / (2 * std::numbers::pi), half_width_i = known("damping") / (4 * std::numbers::pi * mass);
+    if (std::abs(f - f_i) <= half_width + half_width_i) return false;
+  }
+  return true;
+}
+
 constexpr const char* excite = "Record a run that excites this mode: a pluck or a blow elsewhere.";
 
 }  // namespace
@@ -61,8 +76,7 @@ Effect higher_mode() {
     if (c.model.rig().is_modal()) append_mode(system, c);
   };
   e.enriches_basis = true;
-  // Seen in the roll of a ship.
-  e.only_if_named_on_modes = "a mode beside a known one passes for damping and stiffness that change with amplitude";
+  e.distinct = stands_apart;
   return e;
 }
 

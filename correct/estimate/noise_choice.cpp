@@ -25,7 +25,7 @@ double cost_of(const Colours& colours, Index readings) {
 }  // namespace
 
 void choose_colour(RunInLegs& legs, Search& search, const std::vector<ChannelColour>& expected, double enough) {
-  if (legs.size() > 1 || !legs.residual(0).may_be_coloured(search.solution.theta)) return;
+  if (legs.size() > 1 || !legs.residual(0).may_be_coloured()) return;
   const RunInLegs white = legs;
   const Index readings = white.residual(0).observations();
   double surprise = minus_twice_log_evidence(white.residual(0), search);

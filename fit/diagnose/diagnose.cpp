@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <memory>
 #include <set>
 
 #include "core/effects/effect.h"
@@ -87,13 +88,17 @@ PlainFit plain_fit(const FitProblem& problem, const Arrival& baseline, bool thor
   return plain;
 }
 
+bool has_colour(const JointProblem& joint) {
+  return std::any_of(joint.runs().begin(), joint.runs().end(), [](const RunResidual& run) { return run.colour(0) != nullptr; });
+}
+
 /// Both fits in full, and what they leave of the fitted runs.
 void describe(const DiagnoseProblem& problem, const FitProblem& fit_problem, const Trial& baseline, const Trial& best, Diagnosis& d) {
   FitProblem after = fit_problem;
   after.effects = best.effects;
   Arrival before_arrival = baseline.arrival, after_arrival = best.arrival;
   if (d.mismatch.found) {
-    PlainFit plain = plain_fit(fit_problem, baseline.arrival, d.unexplained);
+    PlainFit plain = plain_fit(fit_problem, baseline.arrival, d.unexplained && !has_colour(baseline.arrival.joint));  // first guesses know of none
     before_arrival = std::move(plain.arrival);
     if (plain.baseline_was_lost) d.not_followed.insert(d.not_followed.begin(), std::vector<std::string>{});
   }
@@ -210,14 +215,23 @@ Diagnosis diagnose_in_order(const DiagnoseProblem& problem) {
   fit_problem.circulation = problem.circulation;
 
   tell("fitting the rig with nothing missing");
-  const Trial baseline = fit_baseline(fit_problem);
+  Trial baseline = fit_baseline(fit_problem);
   refuse_short_runs(baseline.arrival.joint);
   Diagnosis d;
   d.mismatch = locate_mismatch(baseline.arrival.joint);
+  bool coloured = d.mismatch.found && take_noise_colour(baseline);
+  auto selection = std::make_unique<Selection>(problem, fit_problem, baseline);
+  Trial best = selection->best_set(!coloured);
+  if (selection->coloured()) {
+    tell("trying what may be missing, in noise of the colour that is left");
+    coloured = true;
+    take_noise_of(baseline, *selection->coloured());
+    selection = std::make_unique<Selection>(problem, fit_problem, baseline);
+    best = selection->best_set(false);
+  }
+  if (coloured) d.mismatch = locate_mismatch(baseline.arrival.joint);
   if (!problem.verdict_only) d.maps = residual_maps(baseline.arrival.joint, d.mismatch.runs);
-  Selection selection(problem, fit_problem, baseline);
-  const Trial best = selection.best_set();
-  d.ranking = selection.ranking();
+  d.ranking = selection->ranking();
   d.remaining = what_remains(best);
   const bool clean = !d.remaining.found;
   const std::vector<ImprovedRun> unseen = problem.verdict_only ? std::vector<ImprovedRun>{} : predict_unseen(problem, fit_problem, baseline.arrival, best);
@@ -237,7 +251,7 @@ Diagnosis diagnose_in_order(const DiagnoseProblem& problem) {
   if (!d.not_followed.empty()) d.search = SearchOutcome::failed;
   if (!best.effects.empty()) {
     d.naming = naming_of(best, baseline, clean, predicts);
-    if (d.naming == Naming::named) name_equivalent(baseline, best, selection.tried(), problem.verdict_only, d);
+    if (d.naming == Naming::named) name_equivalent(baseline, best, selection->tried(), problem.verdict_only, d);
     else d.removed_by_closest = 1 - best.excess() / baseline.excess();
     (d.naming == Naming::named ? d.missing : d.closest) = effects_of(best, d);
   }

@@ -55,7 +55,7 @@ HeldoutResidual predict_heldout(const Arrival& arrival, const FitProblem& proble
   for (Index k = 0; k < left.size(); ++k)
     if (weight[k] > 0 && std::isfinite(left[k])) sum += left[k] * left[k], ++count;
   result.rms = p.output.allFinite() ? std::sqrt(sum / std::max(1.0, count)) : INFINITY;  // a model that runs away predicts nothing
-  result.noise = residual.sigma(0);
+  result.noise = residual.noise(0);
   return result;
 }
 

@@ -50,6 +50,15 @@ VectorXd smoothed(const VectorXd& x, Index half) {
   return out;
 }
 
+/// Whether what is left at rest is noise whatever its level and tails: white, and its size too (A. I. McLeod, W. K. Li, J. Time Series Anal. 4 (1983) 269; of the absolute value, which has a variance where
+/// the fourth moment has not). What a model lacks comes and goes with the motion.
+bool is_noise(const RunResidual& run, const VectorXd& left) {
+  const VectorXd resting = residual_at_rest(left, run.motion().phases(), run.linear_unknowns());
+  const double mean = resting.cwiseAbs().sum() / static_cast<double>((resting.array() != 0).count());
+  const VectorXd size = (resting.array() != 0).select(resting.cwiseAbs().array() - mean, 0.0);
+  return whiteness({resting}) > significant && whiteness({size}) > significant;
+}
+
 bool is_linear(const RunResidual& run, const VectorXd& theta) { return run.model().system(run.conditions(), theta, run.channels()).feedback.empty(); }
 
 /// "growing with the motion": how the r.m.s. of the excess goes with that of the gauge's own swing from run to run, where three or more runs tell.
@@ -111,7 +120,7 @@ Mismatch locate_mismatch(const JointProblem& joint) {
       m.energy = left.squaredNorm() / count;
       const double freedom = count - static_cast<double>(run.linear_unknowns());
       const double energy_p = upper_normal((left.squaredNorm() - freedom) / std::sqrt(2 * freedom) / beyond_motion - (beyond_motion - 1) * std::sqrt(freedom / 2));
-      m.p_value = std::min(1.0, 2 * std::min(energy_p, whiteness({left})));
+      m.p_value = std::min(1.0, is_noise(run, left) ? 2 * whiteness({left}) : 2 * std::min(energy_p, whiteness({left})));
       m.excess = std::max(0.0, left.squaredNorm() - freedom);
       mismatch.channels.push_back(m);
       residuals.push_back(std::move(left));

@@ -182,7 +182,7 @@ std::vector<MissingForce> missing_forces(const JointProblem& joint) {
     VectorXd left = run.run().channel("gauge").value - p.output.col(0);
     for (Index k = 0; k < left.size(); ++k)
       if (!(run.channel_weight(0)[k] > 0)) left[k] = std::nan("");
-    forces[r] = estimate_force(system, run.run().dt, left, run.sigma(0));
+    forces[r] = estimate_force(system, run.run().dt, left, run.noise(0));
     forces[r].run = run.run().file;
     forces[r].as_read = as_steady_force(system, run);
   });

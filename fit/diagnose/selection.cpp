@@ -66,6 +66,15 @@ bool takes_nothing(const Trial& trial, const Trial& base) {
   return excess(trial) > hardly_less * excess(base);
 }
 
+/// Whether each effect is something of its own beside the rest of the model; what makes one peak with a known mode, say, has taken its part of something else.
+bool distinct(const Trial& trial) {
+  const JointProblem& joint = trial.arrival.joint;
+  return std::all_of(trial.effects.begin(), trial.effects.end(), [&](const std::string& id) {
+    const Effect& e = effect(id);
+    return !e.distinct || e.distinct(joint.model(), joint.theta(0));
+  });
+}
+
 bool any_leaves_nothing(const Trials& trials) { return std::any_of(trials.begin(), trials.end(), leaves_nothing); }
 
 /// All over again for those ahead, and for effects whose own fit has nothing to search in.
@@ -125,7 +134,7 @@ Strings Selection::candidates(const Strings& at_work, const Strings& hopeless) c
     if (!problem_.effects.empty() && std::find(problem_.effects.begin(), problem_.effects.end(), e.id) == problem_.effects.end()) continue;
     if (std::find(at_work.begin(), at_work.end(), e.id) != at_work.end()) continue;
     if (std::find(hopeless.begin(), hopeless.end(), e.id) != hopeless.end()) continue;
-    if (problem_.effects.empty() && !e.why_only_named(problem_.rig).empty()) continue;
+    if (problem_.effects.empty() && !e.only_if_named.empty()) continue;
     if (why_idle(e, problem_.rig, conditions).empty()) ids.push_back(e.id);
   }
   return ids;
@@ -173,6 +182,7 @@ Trials Selection::try_one_more(const Trial& base, const Strings& hopeless) {
       std::move(unpromising.begin(), unpromising.end(), std::back_inserter(linear));
     }
   }
+  std::erase_if(linear, [](const Trial& t) { return !distinct(t); });
   std::sort(linear.begin(), linear.end(), [](const Trial& a, const Trial& b) { return bic_difference(a, b) < 0; });
   std::stable_partition(linear.begin(), linear.end(), plausible);
   for (const Trial& t : linear) ranking_.push_back({t.effects, t.reduced_chi2(), bic_difference(t, baseline_), 0, base.effects.empty() ? t.score : 0, search_of(t, base)});
@@ -235,7 +245,7 @@ void Selection::try_with_all_modes(Trials& tried) {
   std::stable_partition(tried.begin(), tried.end(), plausible);
 }
 
-Trial Selection::best_set() {
+Trial Selection::best_set(bool in_white_noise) {
   Trial best = baseline_;
   std::optional<Trial> sufficient;  // a law that is followed all but exactly: what it leaves has a name only where that leaves nothing
   Strings hopeless;  // laws with which alone the fit is worse than without: from that far away they are not found, and are not tried again before half of the way is gone
@@ -258,6 +268,10 @@ Trial Selection::best_set() {
     best = exchanged(without_superfluous(next), hopeless);
     judge_decays(best);
     std::move(tried.begin(), tried.end(), std::back_inserter(tried_));
+    if (in_white_noise && what_remains(best).found) {
+      Trial coloured = best;
+      if (take_noise_colour(coloured)) return *(coloured_ = std::move(coloured));
+    }
   }
   return sufficient && what_remains(best).found ? *sufficient : best;
 }

@@ -22,8 +22,10 @@ class Selection {
   /// Looks at all three as long as it lives.
   Selection(const DiagnoseProblem& problem, const FitProblem& fit_problem, const Trial& baseline);
 
-  /// `baseline` itself where no mismatch is found or no effect is worth it.
-  Trial best_set();
+  /// `baseline` itself where no mismatch is found or no effect is worth it. `in_white_noise`: it ends where what a set leaves is noise that is not white; all sets are to be held against that then.
+  Trial best_set(bool in_white_noise);
+  /// The set beside which the noise was seen to have a colour.
+  const std::optional<Trial>& coloured() const { return coloured_; }
 
   /// Sets that were fitted in rounds from which the search went on.
   const std::vector<Trial>& tried() const { return tried_; }
@@ -45,6 +47,7 @@ class Selection {
   const FitProblem& fit_problem_;
   const Trial& baseline_;
   std::vector<Trial> tried_;
+  std::optional<Trial> coloured_;
   std::vector<Candidate> ranking_;
 };
 

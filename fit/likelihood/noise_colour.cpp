@@ -242,13 +242,19 @@ WhiteningFilter::WhiteningFilter(const NoiseColour& colour, double dt) : pole_(p
 
 VectorXd WhiteningFilter::settled() const { return (MatrixXd::Identity(states(), states()) - feed_).partialPivLu().solve(gain_); }
 
+void WhiteningFilter::filter(Eigen::Ref<MatrixXd> columns, MatrixXd& state) const {
+  for (Index j = 0; j < columns.cols(); ++j)
+    for (Index k = 0; k < columns.rows(); ++k) {
+      const double innovation = columns(k, j) - state.col(j).sum();
+      columns(k, j) = g_ * innovation;
+      state.col(j) = pole_.cwiseProduct(state.col(j)) + gain_ * innovation;
+    }
+}
+
 VectorXd WhiteningFilter::filtered(const VectorXd& readings) const {
-  VectorXd white(readings.size()), state = settled() * readings[0];
-  for (Index k = 0; k < readings.size(); ++k) {
-    const double innovation = readings[k] - state.sum();
-    white[k] = g_ * innovation;
-    state = pole_.cwiseProduct(state) + gain_ * innovation;
-  }
+  VectorXd white = readings;
+  MatrixXd state = settled() * readings[0];
+  filter(white, state);
   return white;
 }
 

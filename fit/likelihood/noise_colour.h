@@ -61,6 +61,8 @@ class WhiteningFilter {
   Eigen::VectorXd settled() const;
   /// Readings without gaps, filtered from the settled state of the first.
   Eigen::VectorXd filtered(const Eigen::VectorXd& readings) const;
+  /// Columns of samples, filtered in place from the states in `state` (states x columns), which is left at those behind the last sample.
+  void filter(Eigen::Ref<Eigen::MatrixXd> columns, Eigen::MatrixXd& state) const;
   /// R with R^T R the inverse covariance of the noise's own state s_0 at the first sample.
   Eigen::MatrixXd start_information() const;
   /// log |det R|, whose rows are orthogonal.

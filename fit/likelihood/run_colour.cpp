@@ -21,11 +21,6 @@ VectorXd RunResidual::at_rest(VectorXd left, const VectorXd& weight) const {
   return left;
 }
 
-bool RunResidual::may_be_coloured(const VectorXd& theta) const {
-  const bool goes_on = arrival_.rows() > 0, driven = inputs_.cols() > 0;
-  return !goes_on && !driven && model_->system(conditions_, theta, channels_).feedback.empty();
-}
-
 RunResidual::Colours RunResidual::colours(const VectorXd& theta, const std::vector<ChannelColour>& expected) const {
   const Prediction p = predict(theta);
   Colours found;
@@ -68,7 +63,9 @@ double RunResidual::log_noise_density() const {
 void RunResidual::take_colour(const RunResidual& other) {
   if (&other != this) colour_ = other.colour_, whitened_ = other.whitened_;
   filters_.clear();
+  const Index before = unknowns_, ends = unknowns_ - first_offset_;  // offsets and the angle before the motion
   while (!free_.empty() && free_.back() >= states_) free_.pop_back();
+  const auto of_model = static_cast<Index>(free_.size());
   Index states = states_;
   for (const std::optional<NoiseColour>& colour : colour_) {
     if (!colour) continue;
@@ -77,6 +74,12 @@ void RunResidual::take_colour(const RunResidual& other) {
   }
   if (!filters_.empty()) shared_.reset();  // responses behind filters are this run's own
   lay_out();
+  guide_ = {};
+  if (last_linear_.size() != before) return;
+  VectorXd start = VectorXd::Zero(unknowns_);  // a search for c starts from the same motion, states and offsets
+  start.head(first_state_ + of_model) = last_linear_.head(first_state_ + of_model);
+  start.tail(ends) = last_linear_.tail(ends);
+  last_linear_ = start;
 }
 
 /// [c | reading] of the noise's state at the first sample, which is the filter's start less what the offset has settled it to.
@@ -97,9 +100,32 @@ void RunResidual::add_colour_rows() {
   }
 }
 
+Index RunResidual::filter_states() const {
+  Index states = 0;
+  for (const WhiteningFilter& filter : filters_) states += filter.states();
+  return states;
+}
+
+/// The states of each filter: the last rows of `state`.
+RunResidual::FilterStates RunResidual::filters_at(const MatrixXd& state) const {
+  FilterStates at;
+  Index row = state.rows() - filter_states();
+  for (const WhiteningFilter& filter : filters_) {
+    at.emplace_back(state.middleRows(row, filter.states()));
+    row += filter.states();
+  }
+  return at;
+}
+
+/// Sends what a nonlinear model says of a channel, in columns, through the filter of that channel, if it has one.
+void RunResidual::filter_outputs(std::size_t channel, Eigen::Ref<MatrixXd> columns, FilterStates& states) const {
+  if (!colour(channel)) return;
+  const auto filter = static_cast<std::size_t>(std::count_if(colour_.begin(), colour_.begin() + static_cast<std::ptrdiff_t>(channel), [](const auto& c) { return c.has_value(); }));
+  filters_[filter].filter(columns, states[filter]);
+}
+
 void RunResidual::filter_output(LinearSystem& system, ExactStep& step) const {
-  if (filters_.empty()) return;
-  if (!system.feedback.empty()) throw std::logic_error("coloured noise of a nonlinear model");
+  if (filters_.empty() || !system.feedback.empty()) return;  // what a nonlinear model says is filtered behind it
   for (std::size_t c = 0, f = 0; c < colour_.size(); ++c)
     if (colour_[c]) filters_[f++].append(static_cast<Index>(c), system, step);
 }

@@ -56,10 +56,12 @@ struct RunResidual::NonlinearPoint {
 
 RunResidual::NonlinearPoint RunResidual::nonlinear_point(const Linearised& lin, const VectorXd& theta, const VectorXd& linear) const {
   NonlinearDrive from{initial_state(linear, lin.system.states()), whole_jerk(linear), inputs_, MatrixXd(lin.system.states(), 0), {}};
-  const NonlinearResponse response = follow(lin.system, lin.step, theta, from, last_sample_, Partials::none);
+  NonlinearResponse response = follow(lin.system, lin.step, theta, from, last_sample_, Partials::none);
   NonlinearPoint point{linear, {}};
   if (!response.finite) return point;
-  point.left = measured_.topRows(last_sample_) - response.output;
+  FilterStates filters = filters_at(initial_state(linear, lin.system.states() + filter_states()));
+  for (Index c = 0; c < measured_.cols(); ++c) filter_outputs(static_cast<std::size_t>(c), response.output.col(c), filters);
+  point.left = readings().topRows(last_sample_) - response.output;
   point.left.rowwise() -= linear.segment(first_offset_, measured_.cols()).transpose();
   point.chi2 = lin.noise ? lin.white(*this, point.left.reshaped()).squaredNorm() : weight_.topRows(last_sample_).cwiseProduct(point.left).squaredNorm();
   for (const MatrixXd& rows : angle_rows_) point.chi2 += (rows.leftCols(unknowns_) * linear - rows.col(unknowns_)).squaredNorm();
@@ -77,10 +79,11 @@ VectorXd RunResidual::largest_arguments(const VectorXd& theta) const {
 
 /// The rows [c | y] of the model linearised about `linear`; solves them for the next c. False where the model diverges.
 bool RunResidual::stack_nonlinear_rows(Linearised& lin, const VectorXd& theta, const VectorXd& linear) const {
-  const Index n = lin.system.states();
+  const Index n = lin.system.states(), with_filters = n + filter_states();
   const VectorXd jerk = whole_jerk(linear);
   NonlinearDrive from{initial_state(linear, n), {}, {}, {}, {}};
-  MatrixXd start = MatrixXd::Zero(n, unknowns_);  // d state / d c
+  FilterStates filters = filters_at(initial_state(linear, with_filters));
+  MatrixXd start = MatrixXd::Zero(with_filters, unknowns_);  // d state / d c, those of the filters behind the model's
   for (std::size_t i = 0; i < free_.size(); ++i) start(free_[i], first_state_ + static_cast<Index>(i)) = 1;
   std::vector<MatrixXd> rows;
   double unreachable = 0;
@@ -89,8 +92,10 @@ bool RunResidual::stack_nonlinear_rows(Linearised& lin, const VectorXd& theta, c
     const Interval s = counted(phase);
     if (s.length() <= 0) break;
     drive_over(s, phase.moving, jerk, inputs_, from);
-    from.start_tangent = phase.moving ? start : MatrixXd::Identity(n, n);
+    const MatrixXd begin = phase.moving ? start : MatrixXd::Identity(with_filters, with_filters);
+    from.start_tangent = begin.topLeftCorner(n, phase.moving ? unknowns_ : n);
     from.jerk_tangent = phase.moving ? jerk_slope(s) : MatrixXd();
+    FilterStates filter_tangents = filters_at(begin);
     NonlinearResponse response = follow(lin.system, lin.step, theta, from, s.length(), Partials::none);
     if (!response.finite) return false;
     if (lin.noise) {  // there is one phase
@@ -100,9 +105,14 @@ bool RunResidual::stack_nonlinear_rows(Linearised& lin, const VectorXd& theta, c
       return true;
     }
     for (Index c = 0; c < measured_.cols(); ++c) {
+      const auto channel = static_cast<std::size_t>(c);
       const auto w = weight_.col(c).segment(s.first, s.length());
-      run_rows::Block block{s, phase.moving, c, start, std::move(response.tangent[static_cast<std::size_t>(c)]), s.last};
-      VectorXd y = measured_.col(c).segment(s.first, s.length()) - response.output.col(c);  // beside the offset, which stays linear
+      MatrixXd tangent = MatrixXd::Zero(s.length(), begin.cols());
+      tangent.leftCols(response.tangent[channel].cols()) = response.tangent[channel];
+      filter_outputs(channel, tangent, filter_tangents);
+      filter_outputs(channel, response.output.col(c), filters);
+      run_rows::Block block{s, phase.moving, c, start, std::move(tangent), s.last};
+      VectorXd y = readings().col(c).segment(s.first, s.length()) - response.output.col(c);  // beside the offset, which stays linear
       MatrixXd reach;
       if (phase.moving) {
         y += block.rows * linear;
@@ -121,7 +131,11 @@ bool RunResidual::stack_nonlinear_rows(Linearised& lin, const VectorXd& theta, c
       lin.blocks.push_back(std::move(block));
     }
     from.start = response.end;
-    start = phase.moving ? response.end_tangent : MatrixXd(response.end_tangent * start);
+    MatrixXd end = MatrixXd::Zero(with_filters, begin.cols());
+    end.topLeftCorner(n, response.end_tangent.cols()) = response.end_tangent;
+    Index row = n;
+    for (const MatrixXd& states : filter_tangents) end.middleRows(row, states.rows()) = states, row += states.rows();
+    start = phase.moving ? end : MatrixXd(end * start);
   }
   rows.insert(rows.end(), angle_rows_.begin(), angle_rows_.end());
   lin.settle(rows, unknowns_, unreachable);
@@ -136,6 +150,7 @@ VectorXd RunResidual::without_laws(const Linearised& lin) const {
   plain.system.feedback.clear();
   for (DualMatrix* m : {&plain.system.B, &plain.system.D}) *m = m->block(0, 0, m->rows(), measured);
   plain.step = exact_step(plain.system, run_->dt);
+  filter_output(plain.system, plain.step);
   prepare_linear(plain);
   stack_rows(plain);
   return plain.linear;
@@ -269,6 +284,9 @@ void RunResidual::follow_nonlinear_partials(const LinearSystem& system, const Ve
   const auto parameters = static_cast<Index>(model_->parameters().size());
   const VectorXd jerk = whole_jerk(linear);
   NonlinearDrive from{initial_state(linear, system.states()), {}, {}, MatrixXd(system.states(), 0), {}};
+  MatrixXd start = MatrixXd::Zero(system.states() + filter_states(), parameters + 1);  // [d / d theta | value]
+  start.col(parameters) = initial_state(linear, start.rows());
+  FilterStates filters = filters_at(start);
   std::size_t block = 0;
   for (const MotionBasis::Phase& phase : phases_) {
     const Interval s = counted(phase);
@@ -278,6 +296,7 @@ void RunResidual::follow_nonlinear_partials(const LinearSystem& system, const Ve
     for (Index c = 0; c < measured_.cols(); ++c) {
       MatrixXd m(s.length(), parameters + 1);
       m << response.tangent[static_cast<std::size_t>(c)], response.output.col(c);
+      filter_outputs(static_cast<std::size_t>(c), m, filters);
       m.col(parameters).array() += linear[first_offset_ + c];
       take(block++, s, std::move(m));
     }
@@ -310,17 +329,28 @@ RunResidual::SideBySide RunResidual::side_by_side(const VectorXd& theta, const V
     for (DualMatrix* m : {&system.A, &system.B, &system.C, &system.D}) m->partial.clear();
   const Index n = system.states(), states = static_cast<Index>(free_.size()), channels = measured_.cols(), parameters = static_cast<Index>(model_->parameters().size());
   NonlinearDrive from{initial_state(linear, n), {}, inputs_, MatrixXd::Zero(n, slopes ? states : 0), {}};
-  for (Index i = 0; i < from.start_tangent.cols(); ++i) from.start_tangent(free_[static_cast<std::size_t>(i)], i) = 1;
-  const NonlinearResponse response = follow(system, step_to_follow(system, run_->dt), theta, from, samples, partials);
+  MatrixXd start = MatrixXd::Zero(n + filter_states(), states + parameters);
+  for (Index i = 0; i < states; ++i) start(free_[static_cast<std::size_t>(i)], i) = 1;
+  if (slopes) from.start_tangent = start.topLeftCorner(n, states);
+  NonlinearResponse response = follow(system, step_to_follow(system, run_->dt), theta, from, samples, partials);
   SideBySide result;
   result.chi2 = INFINITY;
   if (!response.finite) return result;
-  MatrixXd left = measured_.topRows(samples) - response.output;
+  FilterStates filters = filters_at(initial_state(linear, start.rows())), filter_tangents = filters_at(start);
+  for (Index c = 0; c < channels; ++c) {
+    filter_outputs(static_cast<std::size_t>(c), response.output.col(c), filters);
+    if (slopes) filter_outputs(static_cast<std::size_t>(c), response.tangent[static_cast<std::size_t>(c)], filter_tangents);
+  }
+  MatrixXd left = readings().topRows(samples) - response.output;
   left.rowwise() -= linear.segment(first_offset_, channels).transpose();
   left.array() *= weight_.topRows(samples).array();
-  result.chi2 = left.squaredNorm();
+  const MatrixXd known = run_rows::stacked(angle_rows_, unknowns_ + 1);  // of the noise's own state
+  const VectorXd off = known.col(unknowns_) - known.leftCols(unknowns_) * linear;
+  result.chi2 = left.squaredNorm() + off.squaredNorm();
   if (!slopes) return result;
-  MatrixXd rows = MatrixXd::Zero(channels * samples, parameters + unknowns_ + 1);
+  MatrixXd rows = MatrixXd::Zero(channels * samples + known.rows(), parameters + unknowns_ + 1);
+  rows.bottomRows(known.rows()).middleCols(parameters, unknowns_) = -known.leftCols(unknowns_);
+  rows.bottomRows(known.rows()).rightCols(1) = off;
   for (Index c = 0; c < channels; ++c) {
     auto of_channel = rows.middleRows(c * samples, samples);
     const auto w = weight_.col(c).head(samples);

@@ -168,8 +168,8 @@ class RunResidual {
   /// efficient), unless those of third order are smaller by more than chance.
   void settle_noise(const Eigen::VectorXd& theta);
 
-  /// Whether a colour can be set: of linear models that are driven by nothing measured and go on from no other part.
-  bool may_be_coloured(const Eigen::VectorXd& theta) const;
+  /// Whether a colour can be set: where nothing measured drives the model and it goes on from no other part.
+  bool may_be_coloured() const { return arrival_.rows() == 0 && inputs_.cols() == 0; }
   using Colours = std::vector<std::optional<NoiseColour>>;
   /// The colour of each channel's noise in what the model at theta leaves of it at rest (fit/likelihood/noise_colour.h); where others have shown what to expect, that in this run's size.
   Colours colours(const Eigen::VectorXd& theta, const std::vector<ChannelColour>& expected) const;
@@ -239,6 +239,10 @@ class RunResidual {
   void take_colour(const RunResidual& other);
   void add_colour_rows();
   void filter_output(LinearSystem& system, ExactStep& step) const;
+  using FilterStates = std::vector<Eigen::MatrixXd>;
+  Eigen::Index filter_states() const;
+  FilterStates filters_at(const Eigen::MatrixXd& state) const;
+  void filter_outputs(std::size_t channel, Eigen::Ref<Eigen::MatrixXd> columns, FilterStates& states) const;
   const Eigen::MatrixXd& readings() const { return whitened_.size() > 0 ? whitened_ : measured_; }
   void forget_solutions() {
     last_solution_ = {};

@@ -9,6 +9,7 @@
 #include "core/numerics/spectrum.h"
 #include "fit/search/decays_first.h"
 #include "fit/fit.h"
+#include "fit/fit_description.h"
 #include "fit/search/own_parameters.h"
 #include "fit/likelihood/standardised_residual.h"
 
@@ -237,6 +238,24 @@ Trial fit_baseline(const FitProblem& problem) {
   anneal(trial.arrival, 5);
   measure(trial);
   return trial;
+}
+
+bool take_noise_colour(Trial& trial) {
+  JointProblem& joint = trial.arrival.joint;
+  const std::vector<ChannelColour> in_common = noise_colours(joint);
+  if (in_common.empty()) return false;
+  for (std::size_t r = 0; r < joint.runs().size(); ++r) {
+    RunResidual& run = joint.runs()[r];
+    if (run.may_be_coloured() && !run.is_aside()) run.set_colours(joint.theta(r), run.colours(joint.theta(r), in_common));
+  }
+  fit_fully(trial, 2);
+  return true;
+}
+
+void take_noise_of(Trial& trial, const Trial& other) {
+  JointProblem& joint = trial.arrival.joint;
+  for (std::size_t r = 0; r < joint.runs().size(); ++r) joint.runs()[r].keep_noise_of(other.arrival.joint.runs()[r]);
+  fit_fully(trial, 5);
 }
 
 Trial prepare(const FitProblem& problem, const Trial& base, const std::vector<std::string>& effects) {

@@ -49,6 +49,11 @@ double deviance_difference(const Trial& a, const Trial& b);
 /// The best fit with nothing missing.
 Trial fit_baseline(const FitProblem& problem);
 
+/// Gives each run noise of the colour that is left of all of them at rest (noise_colours), in its own size, and fits again. False, and nothing done, where that is white.
+bool take_noise_colour(Trial& trial);
+/// Gives the runs of `trial` the noise of those of `other`, and fits again.
+void take_noise_of(Trial& trial, const Trial& other);
+
 /// One linear step from `base` with `effects` (those of base and one more): what would it remove?
 Trial prepare(const FitProblem& problem, const Trial& base, const std::vector<std::string>& effects);
 

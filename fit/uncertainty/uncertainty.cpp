@@ -43,6 +43,27 @@ MatrixXd inverse_information(const JointProblem& joint, const JointProblem::Line
   return inverse_of(information);
 }
 
+/// Per estimate: its row of `influence` times slopes^T residual, over the samples until half of all that the run says of it.
+VectorXd moved_by_earlier_half(const RunResidual::Sensitivity& sensitivity, const MatrixXd& influence) {
+  const Index samples = sensitivity.channels.front().residual.size();
+  MatrixXd says = MatrixXd::Zero(samples, influence.rows()), pull = says;
+  for (const auto& channel : sensitivity.channels) {
+    const MatrixXd through = channel.slope * influence.transpose();
+    says += through.cwiseAbs2();
+    pull += channel.residual.asDiagonal() * through;
+  }
+  VectorXd moved = VectorXd::Zero(influence.rows());
+  for (Index a = 0; a < moved.size(); ++a) {
+    const double half = 0.5 * says.col(a).sum();
+    double said = 0;
+    for (Index k = 0; k < samples && said < half; ++k) {
+      said += says(k, a);
+      moved[a] += pull(k, a);
+    }
+  }
+  return moved;
+}
+
 }  // namespace
 
 JointInformation joint_information(const JointProblem& joint, const NumberSlopes& slopes) {
@@ -97,6 +118,7 @@ InexactUncertainty inexact_uncertainty(const JointProblem& joint, const NumberSl
   const MatrixXd estimates = by_theta * inverse;
   MatrixXd white = estimates * by_theta.transpose();
   const MatrixXd stated = estimates.rightCols(deviations) * estimates.rightCols(deviations).transpose();  // the part of the errors that is the numbers' own
+  u.earlier_half = VectorXd::Zero(count);
   for (Index r = 0; r < runs; ++r) {
     const RunResidual& run = joint.runs()[static_cast<std::size_t>(r)];
     if (run.is_aside()) {
@@ -123,6 +145,7 @@ InexactUncertainty inexact_uncertainty(const JointProblem& joint, const NumberSl
       if (acts(a)) own.row(unknown(a).parameter) += influence.row(a);
     own.bottomRows(deviations) = influence.bottomRows(deviations);
     coloured.add(coloured_covariance(sensitivity, residuals, influence, count + r, own));
+    u.earlier_half += 2 * moved_by_earlier_half(sensitivity, influence.topRows(count));
   }
   const MatrixXd white_all = std::max(1.0, lin.chi2() / freedom) * (white - stated) + stated, coloured_all = coloured.with_its_own_error() + stated;
   u.white_covariance = white_all.topLeftCorner(count + runs, count + runs);

@@ -14,6 +14,9 @@ struct ParameterUncertainty {
   Eigen::MatrixXd offset_slope;          ///< d offset / d unknown, of all unknowns, held ones too; a row per run
   bool coloured = false;                 ///< some run's residual is not white: its probability, times the number of runs, is below 1 %
   std::vector<double> whiteness;         ///< per run
+  /// How far each unknown would move without the later halves of the runs, to first order: 2 G times slopes^T residual over the earlier halves, G as in fit/uncertainty/coloured_noise.h. A half holds half of
+  /// what the run says of the unknown. Where what is left is noise, of whatever colour, this has the unknown's own variance.
+  Eigen::VectorXd earlier_half;
 
   const Eigen::MatrixXd& with_offsets() const { return coloured ? coloured_covariance : white_covariance; }
   /// Of the unknowns alone.

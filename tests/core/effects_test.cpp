@@ -304,14 +304,29 @@ TEST(Effects, SayWhyTheyCannotAct) {
 }
 
 TEST(Effects, SayWhyADiagnosisTriesThemOnlyWhereNamed) {
-  const auto only_named = [](const Rig& rig) {
-    std::vector<std::string> ids;
-    for (const Effect& e : effects())
-      if (!e.why_only_named(rig).empty()) ids.push_back(e.id);
-    return ids;
+  std::vector<std::string> ids;
+  for (const Effect& e : effects())
+    if (!e.only_if_named.empty()) ids.push_back(e.id);
+  EXPECT_THAT(ids, testing::UnorderedElementsAre("bouc-wen", "cubic-damping"));
+}
+
+/// Of two modes the peaks overlap within half of the sum of their half-power bandwidths.
+TEST(Effects, AModeThatMakesOnePeakWithAKnownOneIsNotDistinct) {
+  const Rig rig = two_modes();
+  const AeroelasticModel model = AeroelasticModel(rig, make_basis(rig, 500, 0), wagner(Wagner::jones)).with_effects({"higher-mode"});
+  Eigen::VectorXd theta = model.start_values();
+  const double known = rig.modal[0].frequency, width = 0.02;
+  theta[model.index("higher-mode.damping_ratio")] = width;
+  const auto distinct_at = [&](double hertz) {
+    theta[model.index("higher-mode.frequency")] = hertz;
+    return effect("higher-mode").distinct(model, theta);
   };
-  EXPECT_THAT(only_named(beam()), testing::UnorderedElementsAre("bouc-wen", "cubic-damping"));
-  EXPECT_THAT(only_named(two_modes()), testing::UnorderedElementsAre("bouc-wen", "cubic-damping", "higher-mode"));
+  const double overlap = (width + rig.modal[0].damping_ratio) * known;
+  EXPECT_FALSE(distinct_at(known));
+  EXPECT_FALSE(distinct_at(known + 0.9 * overlap));
+  EXPECT_FALSE(distinct_at(known - 0.9 * overlap));
+  EXPECT_TRUE(distinct_at(known - 1.1 * overlap));
+  EXPECT_FALSE(distinct_at(rig.modal[1].frequency));
 }
 
 TEST(Effects, UnknownIdsAreRefused) {
