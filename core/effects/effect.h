@@ -79,8 +79,8 @@ struct Effect {
   Needs needs = Needs::any_rig;
   /// Why `unrig diagnose` tries it only where it is named; empty: wherever it acts.
   std::string only_if_named = {};
-  /// Whether, with these parameters of the model, it is something of its own beside what the model has without it. Without it it always is.
-  std::function<bool(const AeroelasticModel&, const Eigen::VectorXd& theta)> distinct = {};
+  /// Whether, with these parameters of the model, it is something of its own beside what the model has without it and beside other effects, in records of so many seconds. None: it always is.
+  std::function<bool(const AeroelasticModel&, const Eigen::VectorXd& theta, double seconds)> distinct = {};
 };
 
 /// "carriage-vibration needs a run in a stream": why it acts in none of these runs of the rig; empty if it does in one.

@@ -37,9 +37,11 @@ void append_mode(LinearSystem& system, const EffectContext& c) {
 }
 
 /// Whether its half-power bandwidth, 2 zeta f, and that of each known mode leave each other free: |f - f_i| > zeta f + zeta_i f_i. Modes that overlap make one peak, by which damping and stiffness that change
-/// with amplitude pass for two. Source: R. H. Lyon, R. G. DeJong, Theory and Application of Statistical Energy Analysis (1995), modal overlap.
-bool stands_apart(const AeroelasticModel& model, const Eigen::VectorXd& theta) {
+/// with amplitude pass for two. Source: R. H. Lyon, R. G. DeJong, Theory and Application of Statistical Energy Analysis (1995), modal overlap. And whether its decay time, 1/(2 pi zeta f), is within the record:
+/// one that does not decay there is a tone, of the mains for instance.
+bool stands_apart(const AeroelasticModel& model, const Eigen::VectorXd& theta, double seconds) {
   const double f = theta[model.index("higher-mode.frequency")], half_width = theta[model.index("higher-mode.damping_ratio")] * f;
+  if (2 * std::numbers::pi * half_width * seconds < 1) return false;
   for (std::size_t i = 0; i < model.rig().modal.size(); ++i) {
     const auto known = [&](const char* what) { return theta[model.index(fmt::format("modal[{}].{}", i + 1, what))]; };
     const double mass = known("mass"), f_i = std::sqrt(known("stiffness") / mass) / (2 * std::numbers::pi), half_width_i = known("damping") / (4 * std::numbers::pi * mass);

@@ -69,10 +69,16 @@ bool takes_nothing(const Trial& trial, const Trial& base) {
 /// Whether each effect is something of its own beside the rest of the model; what makes one peak with a known mode, say, has taken its part of something else.
 bool distinct(const Trial& trial) {
   const JointProblem& joint = trial.arrival.joint;
+  double longest = 0;
+  for (const RunResidual& run : joint.runs()) longest = std::max(longest, run.run().dt * static_cast<double>(run.run().samples()));
   return std::all_of(trial.effects.begin(), trial.effects.end(), [&](const std::string& id) {
     const Effect& e = effect(id);
-    return !e.distinct || e.distinct(joint.model(), joint.theta(0));
+    return !e.distinct || e.distinct(joint.model(), joint.theta(0), longest);
   });
+}
+
+void keep_distinct(Trials& trials) {
+  std::erase_if(trials, [](const Trial& t) { return !distinct(t); });
 }
 
 bool any_leaves_nothing(const Trials& trials) { return std::any_of(trials.begin(), trials.end(), leaves_nothing); }
@@ -164,9 +170,11 @@ Trials Selection::try_one_more(const Trial& base, const Strings& hopeless) {
   constexpr double clearly = 0.8;
   const bool favours_linear = others.empty() || (!linear.empty() && clearly * linear.front().score >= others.front().score);
   fit_linear(linear);
+  keep_distinct(linear);
   bool done = any_leaves_nothing(linear);
   if (favours_linear && !done) {
     fit_anew(fit_problem_, linear);
+    keep_distinct(linear);
     done = any_leaves_nothing(linear);
   }
   if (!done || !favours_linear) {  // a decaying tone may leave nothing of what a weak drag does, and explain it worse
@@ -182,7 +190,7 @@ Trials Selection::try_one_more(const Trial& base, const Strings& hopeless) {
       std::move(unpromising.begin(), unpromising.end(), std::back_inserter(linear));
     }
   }
-  std::erase_if(linear, [](const Trial& t) { return !distinct(t); });
+  keep_distinct(linear);
   std::sort(linear.begin(), linear.end(), [](const Trial& a, const Trial& b) { return bic_difference(a, b) < 0; });
   std::stable_partition(linear.begin(), linear.end(), plausible);
   for (const Trial& t : linear) ranking_.push_back({t.effects, t.reduced_chi2(), bic_difference(t, baseline_), 0, base.effects.empty() ? t.score : 0, search_of(t, base)});

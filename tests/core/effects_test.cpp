@@ -310,7 +310,7 @@ TEST(Effects, SayWhyADiagnosisTriesThemOnlyWhereNamed) {
   EXPECT_THAT(ids, testing::UnorderedElementsAre("bouc-wen", "cubic-damping"));
 }
 
-/// Of two modes the peaks overlap within half of the sum of their half-power bandwidths.
+/// Peaks overlap within half of the sum of their half-power bandwidths.
 TEST(Effects, AModeThatMakesOnePeakWithAKnownOneIsNotDistinct) {
   const Rig rig = two_modes();
   const AeroelasticModel model = AeroelasticModel(rig, make_basis(rig, 500, 0), wagner(Wagner::jones)).with_effects({"higher-mode"});
@@ -319,7 +319,7 @@ TEST(Effects, AModeThatMakesOnePeakWithAKnownOneIsNotDistinct) {
   theta[model.index("higher-mode.damping_ratio")] = width;
   const auto distinct_at = [&](double hertz) {
     theta[model.index("higher-mode.frequency")] = hertz;
-    return effect("higher-mode").distinct(model, theta);
+    return effect("higher-mode").distinct(model, theta, 10);
   };
   const double overlap = (width + rig.modal[0].damping_ratio) * known;
   EXPECT_FALSE(distinct_at(known));
@@ -327,6 +327,10 @@ TEST(Effects, AModeThatMakesOnePeakWithAKnownOneIsNotDistinct) {
   EXPECT_FALSE(distinct_at(known - 0.9 * overlap));
   EXPECT_TRUE(distinct_at(known - 1.1 * overlap));
   EXPECT_FALSE(distinct_at(rig.modal[1].frequency));
+  const double decay_time = 1 / (2 * pi * width * 50);
+  theta[model.index("higher-mode.frequency")] = 50;
+  EXPECT_TRUE(effect("higher-mode").distinct(model, theta, 1.1 * decay_time));
+  EXPECT_FALSE(effect("higher-mode").distinct(model, theta, 0.9 * decay_time)) << "a tone";
 }
 
 TEST(Effects, UnknownIdsAreRefused) {
