@@ -9,6 +9,7 @@
 #include <filesystem>
 #include <utility>
 
+#include "core/rig/parse_rig.h"
 #include "core/rig/rig_chain.h"
 #include "core/rig/rig_gauge.h"
 #include "core/rig/stated_errors.h"
@@ -298,8 +299,9 @@ void take_modes(const TomlTable& file, Rig& rig) {
 
 }  // namespace
 
-Rig read_rig(const std::string& path) {
-  const std::string text = read_text(path);
+Rig read_rig(const std::string& path) { return parse_rig(read_text(path), path); }
+
+Rig parse_rig(const std::string& text, const std::string& path) {
   refuse_other_kinds(text, path, TextKind::rig);
   const TomlTable file = TomlTable::parse(text, path, "Text stands in double quotes, a remark begins with #.");
   check_rig_version(file, path);
