@@ -14,6 +14,7 @@
 #include "core/files/command.h"
 #include "core/files/error.h"
 #include "core/import/import_command.h"
+#include "core/new/new_command.h"
 #include "core/files/last_progress.h"
 #include "core/files/near_word.h"
 #include "core/files/text_file.h"
@@ -31,6 +32,7 @@
 namespace {
 
 constexpr unrig::Command commands[] = {
+    {"new", "write a rig or run file to begin with: an example with remarks and questions", unrig::new_command},
     {"import", "turn a laboratory's file (text, MATLAB, TDMS, universal file) into a run file", unrig::import_command},
     {"check", "are rig file and recordings plausible, and what can they determine", unrig::check_command},
     {"simulate", "simulate what gauge and sensors of a rig read in a run", unrig::simulate_command},
@@ -63,7 +65,7 @@ A recording (run file) says what it is before its columns; `unrig import` makes 
     # speed = "0.6 m/s"            # free stream, 0 in a still tank
     time [s],alpha [deg],gauge [N]
     0.000,2.076,6.857
-A rig file holds its section, masses, flexibilities and gauge, or only its modes:
+A rig file holds its section, masses, stiffness and gauge, or only its modes; `unrig new rig` writes one to begin with:
     unrig_rig = 1
     name = "oscillator"
     [[modal]]

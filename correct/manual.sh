@@ -30,6 +30,7 @@ verbatim << 'STATUS'
 STATUS
 printf '.SH EXAMPLES\n'
 verbatim << 'EXAMPLES'
+unrig new rig --from tube -o rig.toml
 unrig check --rig rig.toml dry_pluck.csv wet_pluck.csv step_a.csv
 unrig fit --rig rig.toml dry_pluck.csv wet_pluck.csv step_a.csv -o fit.json
 unrig correct --rig rig.toml --fit fit.json step_a.csv -o corrected.csv --indicial indicial.csv

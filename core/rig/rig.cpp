@@ -1,12 +1,15 @@
 #include "core/rig/rig.h"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <filesystem>
 #include <utility>
 
+#include "core/rig/parse_rig.h"
 #include "core/rig/rig_chain.h"
 #include "core/rig/rig_gauge.h"
 #include "core/rig/stated_errors.h"
@@ -19,6 +22,7 @@ namespace unrig {
 namespace {
 
 using Eigen::Index;
+using Eigen::VectorXd;
 
 constexpr std::array sensor_kinds = {std::pair{"displacement", SensorKind::displacement}, std::pair{"velocity", SensorKind::velocity},
                                      std::pair{"acceleration", SensorKind::acceleration}, std::pair{"twist", SensorKind::twist},
@@ -33,11 +37,16 @@ void check_rig_version(const TomlTable& file, const std::string& path) {
   }
 }
 
-int element_number(const TomlTable& table, std::string_view key, Index elements) {
-  const int number = table.integer(key);
+/// Refuses an element that a chain does not have.
+void check_element(const TomlTable& table, std::string_view key, int number, Index elements) {
   if (number < 1 || number > elements) {
     table.fail(key, fmt::format("{} is {}", table.full_name(key), number), fmt::format("wanted an element from 1 to {}", elements));
   }
+}
+
+int element_number(const TomlTable& table, std::string_view key, Index elements) {
+  const int number = table.integer(key);
+  check_element(table, key, number, elements);
   return number;
 }
 
@@ -53,32 +62,8 @@ void take_section(const TomlTable& section, Rig& rig) {
   }
 }
 
-void take_stations(const TomlTable& normal, Rig& rig) {
-  rig.station = normal.quantities("station", "m");
-  if (rig.station.size() == 0) normal.fail("station", "normal.station has no values", "wanted one element at least");
-  double inboard = 0;
-  for (Index k = 0; k < rig.station.size(); ++k) {
-    if (!(rig.station[k] > inboard)) {
-      normal.fail("station", fmt::format("normal.station of element {} is {:.6g} m, after {:.6g} m", k + 1, rig.station[k], inboard),
-                  "wanted distances from the clamp that increase");
-    }
-    inboard = rig.station[k];
-  }
-}
-
-void take_chains(const TomlTable& file, Rig& rig) {
-  const TomlTable normal = file.table("normal");
-  const TomlTable torsion = file.table("torsion");
-  take_stations(normal, rig);
-  rig.normal = read_normal_chain(normal, rig.station, rig.warnings);
-  rig.mass_centre = normal.quantities("mass_centre", "m", rig.station.size());
-  rig.torsion = read_torsion_chain(torsion, normal, rig.warnings);
-  rig.rigid_from = element_number(torsion, "rigid_from", std::min(rig.torsion.inertia.size(), rig.station.size()));
-}
-
-void take_submerged(const TomlTable& submerged, Rig& rig) {
+void take_submerged(const TomlTable& submerged, const NormalLayout& layout, Rig& rig) {
   submerged.allow_only({"elements", "strip_length", "strip_length_std", "strip_length_std_percent"});
-  rig.strip_length = submerged.positive_quantity("strip_length", "m");
   rig.submerged = submerged.integers("elements");
   int before = 0;
   for (const int element : rig.submerged) {
@@ -88,6 +73,63 @@ void take_submerged(const TomlTable& submerged, Rig& rig) {
     }
     before = element;
   }
+  if (submerged.has("strip_length") || layout.length.size() == 0 || rig.submerged.empty()) {
+    rig.strip_length = submerged.positive_quantity("strip_length", "m");
+    return;
+  }
+  rig.strip_length = layout.length[rig.submerged.front() - 1];
+  for (const int element : rig.submerged) {
+    const double length = layout.length[element - 1];
+    if (std::abs(length - rig.strip_length) > 1e-9 * length)
+      submerged.fail("strip_length", fmt::format("the submerged elements are {:.6g} and {:.6g} m long, and submerged.strip_length is not given", rig.strip_length, length), "wanted one length of all strips");
+  }
+}
+
+/// Masses on the pitch axis: what is taken where nobody measured it.
+VectorXd read_mass_centres(const TomlTable& normal, Index elements, Assumed& assumed) {
+  if (normal.has("mass_centre")) return normal.quantities("mass_centre", "m", elements);
+  assumed.emplace_back("normal.mass_centre = 0 (on the pitch axis)");
+  return VectorXd::Zero(elements);
+}
+
+/// The submerged section is stiff against the rest, and its inboard end turns all of it.
+int read_rigid_from(const TomlTable& torsion, const Rig& rig, Assumed& assumed) {
+  if (torsion.has("rigid_from") || rig.submerged.empty()) return element_number(torsion, "rigid_from", rig.station.size());
+  assumed.push_back(fmt::format("torsion.rigid_from = {} (the first submerged element)", rig.submerged.front()));
+  return rig.submerged.front();
+}
+
+/// Moments of inertia about the pitch axis that follow from sections know nothing of `mass_centre`; no body has less than its mass times the square of its distance.
+void check_inertia_holds(const TomlTable& torsion, const Rig& rig) {
+  const VectorXd least = rig.normal.inertia.cwiseProduct(rig.mass_centre.cwiseAbs2());
+  for (Index k = 0; k < rig.torsion.inertia.size(); ++k) {
+    const Index carried = k + 1 == rig.rigid_from ? least.size() - k : 1;
+    const double needed = least.segment(k, carried).sum();
+    if (rig.torsion.inertia[k] < needed)
+      torsion.fail("added_inertia", fmt::format("the sections and torsion.added_inertia give element {} an inertia of {:.4g} kg m^2 about the pitch axis", k + 1, rig.torsion.inertia[k]),
+                   fmt::format("wanted at least {:.4g} kg m^2, that of its masses at their normal.mass_centre", needed), "Give torsion.added_inertia, inertia_per_length of a section, or torsion.inertia.");
+  }
+}
+
+/// One note for all that a rig file leaves to the program.
+void say_what_is_assumed(const Assumed& assumed, Rig& rig) {
+  if (!assumed.empty()) rig.warnings.push_back(fmt::format("{}: not given, and taken as: {}", rig.file, fmt::join(assumed, "; ")));
+}
+
+void take_chains(const TomlTable& file, Rig& rig) {
+  const TomlTable normal = file.table("normal");
+  const TomlTable torsion = file.table("torsion");
+  const NormalLayout layout = read_normal_layout(normal);
+  rig.station = layout.station;
+  Assumed assumed;
+  rig.normal = read_normal_chain(normal, layout, rig.warnings, assumed);
+  rig.mass_centre = read_mass_centres(normal, rig.station.size(), assumed);
+  take_submerged(file.table("submerged"), layout, rig);
+  rig.rigid_from = read_rigid_from(torsion, rig, assumed);
+  rig.torsion = read_torsion_chain(torsion, normal, layout, rig.rigid_from, rig.warnings, assumed);
+  check_element(torsion, "rigid_from", rig.rigid_from, rig.torsion.inertia.size());
+  if (!torsion.has("inertia")) check_inertia_holds(torsion, rig);
+  say_what_is_assumed(assumed, rig);
 }
 
 void take_gauge(const TomlTable& gauge, Rig& rig) {
@@ -161,7 +203,6 @@ void take_structure(const TomlTable& file, Rig& rig) {
   file.allow_only({"unrig_rig", "name", "section", "normal", "torsion", "submerged", "gauge", "sensor"});
   take_section(file.table("section"), rig);
   take_chains(file, rig);
-  take_submerged(file.table("submerged"), rig);
   if (file.has("gauge")) take_gauge(file.table("gauge"), rig);
   if (file.has("sensor")) take_sensors(file, rig, true);
   if (rig.gauge_element == 0 && rig.sensors.empty()) {
@@ -198,14 +239,18 @@ void take_sensor_shape(const TomlTable& table, std::size_t sensors, ModalMode& m
     table.fail("sensor_shape", fmt::format("{} has {} numbers", name, mode.sensor_shape.size()), fmt::format("wanted {}, one per [[sensor]] in their order", sensors));
 }
 
+/// Of metal on a bolted clamp; a fit adjusts it.
+constexpr double usual_damping_ratio = 0.01;
+
 /// A mode of a rig with so many sensors.
-ModalMode read_mode(const TomlTable& table, std::size_t sensors) {
+ModalMode read_mode(const TomlTable& table, std::size_t sensors, Assumed& assumed) {
   table.allow_only({"mass", "frequency", "damping_ratio", "gauge_gain", "sensor_shape", "mass_std", "mass_std_percent", "frequency_std", "frequency_std_percent", "damping_ratio_std",
                     "damping_ratio_std_percent", "gauge_gain_std", "gauge_gain_std_percent"});
   ModalMode mode;
   mode.mass = table.positive_quantity("mass", "kg");
   mode.frequency = table.positive_quantity("frequency", "Hz");
-  mode.damping_ratio = table.number("damping_ratio");
+  mode.damping_ratio = table.number_or("damping_ratio", usual_damping_ratio);
+  if (!table.has("damping_ratio")) assumed.push_back(fmt::format("{} = {}", table.full_name("damping_ratio"), usual_damping_ratio));
   if (mode.damping_ratio < 0 || mode.damping_ratio >= 1) {
     table.fail("damping_ratio", fmt::format("{} is {}", table.full_name("damping_ratio"), mode.damping_ratio),
                "wanted a fraction of critical damping, at least 0 and below 1");
@@ -234,8 +279,9 @@ void take_modes(const TomlTable& file, Rig& rig) {
   }
   file.allow_only({"unrig_rig", "name", "modal", "sensor"});
   if (file.has("sensor")) take_sensors(file, rig, false);
+  Assumed assumed;
   for (const TomlTable& table : file.tables("modal")) {
-    rig.modal.push_back(read_mode(table, rig.sensors.size()));
+    rig.modal.push_back(read_mode(table, rig.sensors.size(), assumed));
     const auto has_gauge = [](const ModalMode& mode) { return mode.gauge_gain != 0; };
     if (has_gauge(rig.modal.back()) != has_gauge(rig.modal.front()))
       table.fail("gauge_gain", fmt::format("{} is {}, that of the first mode is {}", table.full_name("gauge_gain"), has_gauge(rig.modal.back()) ? "given" : "missing", has_gauge(rig.modal.front()) ? "given" : "missing"),
@@ -248,12 +294,14 @@ void take_modes(const TomlTable& file, Rig& rig) {
     }
   }
   check_sensors_move(file, rig);
+  say_what_is_assumed(assumed, rig);
 }
 
 }  // namespace
 
-Rig read_rig(const std::string& path) {
-  const std::string text = read_text(path);
+Rig read_rig(const std::string& path) { return parse_rig(read_text(path), path); }
+
+Rig parse_rig(const std::string& text, const std::string& path) {
   refuse_other_kinds(text, path, TextKind::rig);
   const TomlTable file = TomlTable::parse(text, path, "Text stands in double quotes, a remark begins with #.");
   check_rig_version(file, path);

@@ -29,7 +29,12 @@ VectorXd positive_quantities(const TomlTable& chain, std::string_view key, std::
   return positive(chain, key, si, chain.quantities(key, si, count));
 }
 
-int read_modes(const TomlTable& chain, Index elements) {
+/// `modes`; where it is not given `fallback`, 0 for all.
+int read_modes(const TomlTable& chain, Index elements, int fallback, Assumed& assumed) {
+  if (!chain.has("modes")) {
+    assumed.push_back(fmt::format("{} = {}", chain.full_name("modes"), fallback == 0 ? "\"all\"" : std::to_string(fallback)));
+    return fallback;
+  }
   const std::string wanted = fmt::format("wanted \"all\" or a number from 1 to {}, the number of elements", elements);
   if (chain.has_text("modes")) {
     if (chain.text("modes") == "all") return 0;
@@ -87,49 +92,91 @@ auto at_place(const TomlTable& table, std::string_view key, const std::string& w
 
 constexpr const char* end_to_end = "wanted elements laid end to end from the clamp, each with its station inside";
 
-double torsion_constant(const TomlTable& section) {
-  const std::string shape = section.text("shape");
-  if (shape == "circular") {
-    section.allow_only({"shape", "diameter"});
-    return circular_torsion_constant(section.positive_quantity("diameter", "m"));
-  }
-  if (shape == "rectangular") {
-    section.allow_only({"shape", "a", "b"});
-    return rectangular_torsion_constant(section.positive_quantity("a", "m"), section.positive_quantity("b", "m"));
-  }
-  section.fail("shape", fmt::format("{} is \"{}\"", section.full_name("shape"), shape), "wanted \"circular\" or \"rectangular\"");
-}
-
-VectorXd torsion_constants(const TomlTable& torsion, Index count) {
-  if (torsion.has("section") == torsion.has("polar_moment")) {
-    torsion.fail("section",
-                 fmt::format("[torsion] has {} of the keys section and polar_moment", torsion.has("section") ? "both" : "neither"),
-                 "wanted one of them");
-  }
+VectorXd torsion_constants(const TomlTable& torsion, const NormalLayout& layout, Index count) {
+  if (torsion.has("section") && torsion.has("polar_moment")) torsion.fail("section", "[torsion] has both of the keys section and polar_moment", "wanted one of them");
   if (torsion.has("polar_moment")) return positive_quantities(torsion, "polar_moment", "m^4", count);
-  if (!torsion.has_array("section")) return VectorXd::Constant(count, torsion_constant(torsion.table("section")));
-  const std::vector<TomlTable> sections = torsion.tables("section");
-  if (static_cast<Index>(sections.size()) != count) {
-    torsion.fail("section", fmt::format("torsion.section has {} sections", sections.size()),
-                 fmt::format("wanted {}, one per element", count));
-  }
-  VectorXd constants(count);
-  for (Index k = 0; k < count; ++k) constants[k] = torsion_constant(sections[static_cast<std::size_t>(k)]);
-  return constants;
+  if (torsion.has("section")) return read_sections(torsion, SectionsOf::torsion, count).torsion_constants();
+  if (!layout.sections) torsion.fail("section", "[torsion] has neither of the keys section and polar_moment", "wanted one of them, or sections of [normal]");
+  return layout.sections->torsion_constants().head(count);
 }
 
 /// `station` or `length` of the torsion elements: their own, or those of the normal elements of the same number.
-VectorXd torsion_layout(const TomlTable& torsion, const TomlTable& normal, std::string_view key, Index count) {
+VectorXd torsion_layout(const TomlTable& torsion, const VectorXd& of_normal, std::string_view key, Index count) {
   if (torsion.has(key)) return torsion.quantities(key, "m", count);
-  if (!normal.has(key)) {
+  if (of_normal.size() == 0) {
     torsion.fail(key, fmt::format("neither [torsion] nor [normal] has the key \"{}\"", key), "wanted it for a rig from drawings");
   }
-  const VectorXd all = normal.quantities(key, "m");
-  if (all.size() < count) {
-    torsion.fail(key, fmt::format("[torsion] has {} elements and [normal] only {}", count, all.size()),
+  if (of_normal.size() < count) {
+    torsion.fail(key, fmt::format("[torsion] has {} elements and [normal] only {}", count, of_normal.size()),
                  fmt::format("wanted torsion.{} of its own", key));
   }
-  return all.head(count);
+  return of_normal.head(count);
+}
+
+/// Isotropic, Poisson's ratio 0.3: G = E / (2 (1 + 0.3)).
+constexpr double young_over_shear = 2.6;
+
+VectorXd shear_moduli(const TomlTable& torsion, const TomlTable& normal, const NormalLayout& layout, Index count) {
+  if (torsion.has("shear_modulus") || !normal.has("youngs_modulus") || count > layout.station.size()) return positive_quantities(torsion, "shear_modulus", "Pa", count);
+  return positive_quantities(normal, "youngs_modulus", "Pa", layout.station.size()).head(count) / young_over_shear;
+}
+
+// ------------------------------------------------------------------------------------------------------ masses of sections
+
+/// Refuses `keys` beside `given`, which already says it all.
+void refuse_beside(const TomlTable& chain, std::string_view given, std::initializer_list<const char*> keys) {
+  for (const char* key : keys)
+    if (chain.has(key)) chain.fail(key, fmt::format("{} stands beside {}", chain.full_name(key), chain.full_name(given)), "wanted one of them: what is given in whole needs no parts");
+}
+
+VectorXd not_negative(const TomlTable& chain, std::string_view key, std::string_view si, Index count) {
+  if (!chain.has(key)) return VectorXd::Zero(count);
+  VectorXd values = chain.quantities(key, si, count);
+  for (Index k = 0; k < count; ++k)
+    if (!(values[k] >= 0)) chain.fail(key, fmt::format("{} of element {} is {:.6g} {}", chain.full_name(key), k + 1, values[k], si), "wanted zero or more");
+  return values;
+}
+
+VectorXd densities(const TomlTable& normal, const NormalLayout& layout) {
+  if (!normal.has("density")) return VectorXd::Zero(layout.station.size());
+  if (!layout.sections) normal.fail("density", "normal.density without normal.section", "wanted cross-sections, or normal.mass in its place");
+  return positive_quantities(normal, "density", "kg/m^3", layout.station.size());
+}
+
+/// What each torsional element carries: the normal element of its number, the last one all outboard too.
+VectorXd carried(const VectorXd& by_element, int rigid_from) {
+  VectorXd sums = by_element.head(rigid_from);
+  sums[rigid_from - 1] = by_element.tail(by_element.size() - rigid_from + 1).sum();
+  return sums;
+}
+
+/// The chain's inertia must be positive where it is put together.
+VectorXd put_together(const TomlTable& chain, const char* what, const char* si, const VectorXd& values) {
+  for (Index k = 0; k < values.size(); ++k)
+    if (!(values[k] > 0)) chain.fail("section", fmt::format("{} of element {} is {:.6g} {}", chain.full_name(what), k + 1, values[k], si),
+                                     fmt::format("wanted a value above zero: by normal.density, {0}_per_length of a section, {1}, or {2} in their place", what, chain.full_name(fmt::format("added_{}", what)), chain.full_name(what)));
+  return values;
+}
+
+VectorXd read_masses(const TomlTable& normal, const NormalLayout& layout) {
+  const Index count = layout.station.size();
+  if (normal.has("mass") || !layout.sections) {
+    refuse_beside(normal, "mass", {"density", "added_mass"});
+    return positive_quantities(normal, "mass", "kg", count);
+  }
+  const VectorXd by_length = layout.sections->mass_per_length.cwiseProduct(layout.length);
+  return put_together(normal, "mass", "kg", mass_by_density(normal, layout) + by_length + not_negative(normal, "added_mass", "kg", count));
+}
+
+VectorXd read_inertias(const TomlTable& torsion, const TomlTable& normal, const NormalLayout& layout, int rigid_from) {
+  if (torsion.has("inertia") || !layout.sections) {
+    refuse_beside(torsion, "inertia", {"added_inertia"});
+    VectorXd given = positive(torsion, "inertia", "kg.m^2", torsion.quantities("inertia", "kg.m^2"));
+    if (given.size() == 0) torsion.fail("inertia", "torsion.inertia has no values", "wanted one element at least");
+    return given;
+  }
+  const VectorXd by_length = carried(layout.sections->inertia_per_length.cwiseProduct(layout.length), rigid_from);
+  return put_together(torsion, "inertia", "kg m^2", inertia_by_density(normal, layout, rigid_from) + by_length + not_negative(torsion, "added_inertia", "kg.m^2", rigid_from));
 }
 
 /// True where the chain is given by the dimensions of its drawing; these and a flexibility exclude each other.
@@ -145,60 +192,106 @@ bool is_from_drawings(const TomlTable& chain, std::initializer_list<const char*>
 
 }  // namespace
 
-SteppedBeam drawn_beam(const TomlTable& normal, const VectorXd& station) {
-  const Index count = station.size();
+NormalLayout read_normal_layout(const TomlTable& normal) {
+  NormalLayout layout;
+  const Index told = normal.has("station") ? normal.quantities("station", "m").size() : normal.has("length") && !normal.has_text("length") ? normal.quantities("length", "m").size() : 0;
+  if (normal.has("station") && told == 0) normal.fail("station", "normal.station has no values", "wanted one element at least");
+  if (normal.has("section")) layout.sections = read_sections(normal, SectionsOf::normal, told);
+  const Index count = layout.sections ? layout.sections->elements() : told;
+  if (layout.sections && layout.sections->length.size() > 0) {
+    if (normal.has("length")) normal.fail("length", "normal.length stands beside lengths of the sections", "wanted one of them");
+    layout.length = layout.sections->length;
+  } else if (normal.has("length") && count > 0) {
+    layout.length = positive_quantities(normal, "length", "m", count);
+  } else if (layout.sections) {
+    normal.fail("section", "neither normal.length nor the sections have a length", "wanted `length` in each section, of its elements together, or normal.length");
+  }
+  if (normal.has("station")) {
+    layout.station = normal.quantities("station", "m");
+  } else if (count > 0) {
+    layout.station.resize(count);
+    double begin = 0;
+    for (Index k = 0; k < count; begin += layout.length[k], ++k) layout.station[k] = begin + layout.length[k] / 2;
+  } else {
+    normal.quantities("station", "m");  // says that it is missing
+  }
+  double inboard = 0;
+  for (Index k = 0; k < layout.station.size(); ++k) {
+    if (!(layout.station[k] > inboard)) {
+      normal.fail("station", fmt::format("normal.station of element {} is {:.6g} m, after {:.6g} m", k + 1, layout.station[k], inboard),
+                  "wanted distances from the clamp that increase");
+    }
+    inboard = layout.station[k];
+  }
+  return layout;
+}
+
+VectorXd mass_by_density(const TomlTable& normal, const NormalLayout& layout) {
+  VectorXd mass = densities(normal, layout);
+  for (Index k = 0; layout.sections && k < mass.size(); ++k) mass[k] *= layout.sections->section[static_cast<std::size_t>(k)].area * layout.length[k];
+  return mass;
+}
+
+VectorXd inertia_by_density(const TomlTable& normal, const NormalLayout& layout, int rigid_from) {
+  VectorXd inertia = densities(normal, layout);
+  for (Index k = 0; layout.sections && k < inertia.size(); ++k) inertia[k] *= layout.sections->section[static_cast<std::size_t>(k)].polar_second_moment * layout.length[k];
+  return carried(inertia, rigid_from);
+}
+
+SteppedBeam drawn_beam(const TomlTable& normal, const NormalLayout& layout) {
+  const Index count = layout.station.size();
   SteppedBeam beam;
-  beam.station = station;
-  beam.length = positive_quantities(normal, "length", "m", count);
-  beam.stiffness =
-      positive_quantities(normal, "youngs_modulus", "Pa", count).cwiseProduct(positive_quantities(normal, "second_moment", "m^4", count));
+  beam.station = layout.station;
+  beam.length = layout.length.size() > 0 ? layout.length : positive_quantities(normal, "length", "m", count);
+  if (layout.sections && normal.has("second_moment")) normal.fail("second_moment", "normal.second_moment stands beside normal.section", "wanted one of them");
+  beam.stiffness = positive_quantities(normal, "youngs_modulus", "Pa", count)
+                       .cwiseProduct(layout.sections ? layout.sections->second_moments() : positive_quantities(normal, "second_moment", "m^4", count));
   beam.clamp_rotation = compliance(normal, "clamp_spring", "N.m/rad");
   beam.clamp_translation = compliance(normal, "clamp_translation", "N/m");
   return beam;
 }
 
-SteppedBeam drawn_shaft(const TomlTable& torsion, const TomlTable& normal) {
-  const Index count = torsion.quantities("inertia", "kg.m^2").size();
+SteppedBeam drawn_shaft(const TomlTable& torsion, const TomlTable& normal, const NormalLayout& layout, Index count) {
   SteppedBeam shaft;
-  shaft.station = torsion_layout(torsion, normal, "station", count);
-  shaft.length = positive(torsion, "length", "m", torsion_layout(torsion, normal, "length", count));
-  shaft.stiffness = positive_quantities(torsion, "shear_modulus", "Pa", count).cwiseProduct(torsion_constants(torsion, count));
+  shaft.station = torsion_layout(torsion, layout.station, "station", count);
+  shaft.length = positive(torsion, "length", "m", torsion_layout(torsion, layout.length, "length", count));
+  shaft.stiffness = shear_moduli(torsion, normal, layout, count).cwiseProduct(torsion_constants(torsion, layout, count));
   shaft.clamp_rotation = compliance(torsion, "clamp_spring", "N.m/rad");
   return shaft;
 }
 
-Chain read_normal_chain(const TomlTable& normal, const VectorXd& station, std::vector<std::string>& warnings) {
-  normal.allow_only({"station", "mass", "mass_centre", "modes", "flexibility", "length", "youngs_modulus", "second_moment", "clamp_spring",
-                     "clamp_translation", "mass_std", "mass_std_percent", "mass_centre_std", "mass_centre_std_percent", "length_std", "length_std_percent", "youngs_modulus_std",
-                     "youngs_modulus_std_percent", "second_moment_std", "second_moment_std_percent", "clamp_spring_std", "clamp_spring_std_percent", "clamp_translation_std",
-                     "clamp_translation_std_percent"});
-  const Index count = station.size();
+Chain read_normal_chain(const TomlTable& normal, const NormalLayout& layout, std::vector<std::string>& warnings, Assumed& assumed) {
+  normal.allow_only({"station", "mass", "mass_centre", "modes", "flexibility", "length", "section", "density", "added_mass", "youngs_modulus", "second_moment", "clamp_spring",
+                     "clamp_translation", "mass_std", "mass_std_percent", "mass_centre_std", "mass_centre_std_percent", "length_std", "length_std_percent", "density_std", "density_std_percent",
+                     "added_mass_std", "added_mass_std_percent", "youngs_modulus_std", "youngs_modulus_std_percent", "second_moment_std", "second_moment_std_percent", "clamp_spring_std",
+                     "clamp_spring_std_percent", "clamp_translation_std", "clamp_translation_std_percent"});
   Chain chain;
-  chain.inertia = positive_quantities(normal, "mass", "kg", count);
-  chain.modes = read_modes(normal, count);
-  if (!is_from_drawings(normal, {"length", "youngs_modulus", "second_moment", "clamp_spring", "clamp_translation"})) {
+  chain.inertia = read_masses(normal, layout);
+  chain.modes = read_modes(normal, layout.station.size(), 0, assumed);
+  if (!is_from_drawings(normal, {"length", "section", "youngs_modulus", "second_moment", "clamp_spring", "clamp_translation"})) {
     read_given_flexibility(normal, "m/N", chain, warnings);
     return chain;
   }
-  const SteppedBeam beam = drawn_beam(normal, station);
+  const SteppedBeam beam = drawn_beam(normal, layout);
   chain.flexibility = at_place(normal, "length", end_to_end, [&beam] { return bending_flexibility(beam); });
   return chain;
 }
 
-Chain read_torsion_chain(const TomlTable& torsion, const TomlTable& normal, std::vector<std::string>& warnings) {
-  torsion.allow_only(
-      {"inertia", "modes", "rigid_from", "flexibility", "station", "length", "shear_modulus", "polar_moment", "section", "clamp_spring", "length_std", "length_std_percent", "shear_modulus_std",
-       "shear_modulus_std_percent", "polar_moment_std", "polar_moment_std_percent", "clamp_spring_std", "clamp_spring_std_percent"});
+Chain read_torsion_chain(const TomlTable& torsion, const TomlTable& normal, const NormalLayout& layout, int rigid_from, std::vector<std::string>& warnings, Assumed& assumed) {
+  torsion.allow_only({"inertia", "modes", "rigid_from", "flexibility", "station", "length", "shear_modulus", "polar_moment", "section", "added_inertia", "clamp_spring", "length_std",
+                      "length_std_percent", "shear_modulus_std", "shear_modulus_std_percent", "polar_moment_std", "polar_moment_std_percent", "added_inertia_std", "added_inertia_std_percent",
+                      "clamp_spring_std", "clamp_spring_std_percent"});
   Chain chain;
-  chain.inertia = positive(torsion, "inertia", "kg.m^2", torsion.quantities("inertia", "kg.m^2"));
+  chain.inertia = read_inertias(torsion, normal, layout, rigid_from);
   const Index count = chain.inertia.size();
-  if (count == 0) torsion.fail("inertia", "torsion.inertia has no values", "wanted one element at least");
-  chain.modes = read_modes(torsion, count);
-  if (!is_from_drawings(torsion, {"shear_modulus", "polar_moment", "section", "station", "length", "clamp_spring"})) {
+  chain.modes = read_modes(torsion, count, 1, assumed);
+  const bool drawn = is_from_drawings(torsion, {"shear_modulus", "polar_moment", "section", "station", "length", "clamp_spring"});
+  if (!drawn && (torsion.has("flexibility") || !layout.sections)) {
     read_given_flexibility(torsion, "rad/(N.m)", chain, warnings);
     return chain;
   }
-  const SteppedBeam shaft = drawn_shaft(torsion, normal);
+  if (!torsion.has("shear_modulus") && normal.has("youngs_modulus")) assumed.push_back(fmt::format("torsion.shear_modulus = normal.youngs_modulus / {}", young_over_shear));
+  const SteppedBeam shaft = drawn_shaft(torsion, normal, layout, count);
   chain.flexibility = at_place(torsion, "length", end_to_end, [&shaft] { return torsion_flexibility(shaft); });
   return chain;
 }

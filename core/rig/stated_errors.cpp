@@ -91,7 +91,11 @@ std::vector<Given> entries(GivenNumber number, const std::string& name, const st
 
 /// `key.std_percent`, `key.std`, `key.std_values` and `key.common_std_percent` of an array with these values.
 void take_array(const TomlTable& table, const std::string& key, GivenNumber number, const std::string& si, const VectorXd& values, Found& found) {
-  if (!table.has(key)) return;
+  if (!table.has(key)) {
+    for (const std::string& statement : {key + "_std", key + "_std_percent"})
+      if (table.has(statement)) table.fail(statement, fmt::format("{} is not given", table.full_name(key)), "wanted the number that the standard deviation belongs to");
+    return;
+  }
   if (table.has_text(key)) {  // one value for all elements
     refuse_both(table, key + "_std", key + "_std_percent");
     double std = percent(table, key + "_std_percent") * std::abs(values[0]);
@@ -140,31 +144,64 @@ void take_scalar(const TomlTable& table, const std::string& key, GivenNumber num
   found.scalar({number, row, -1, table.full_name(key), si, value, std});
 }
 
+/// An error of the density is one of all masses and moments of inertia that follow from it, together.
+void take_density(const TomlTable& normal, const NormalLayout& layout, const Rig& rig, bool with_inertia, Found& found) {
+  if (!normal.has("density")) {
+    for (const char* key : {"density_std", "density_std_percent"})
+      if (normal.has(key)) normal.fail(key, "normal.density is not given", "wanted the number that the standard deviation belongs to");
+    return;
+  }
+  if (!normal.has_text("density")) {
+    for (const char* key : {"std", "std_percent", "std_values", "common_std_percent"})
+      if (normal.table("density").has(key)) normal.fail("density", fmt::format("normal.density.{} of densities that differ", key), "wanted the error of one density, density_std_percent", "Give `mass` with its own errors instead.");
+    return;
+  }
+  refuse_both(normal, "density_std", "density_std_percent");
+  const double density = normal.quantity("density", "kg/m^3");
+  const double relative = normal.has("density_std") ? deviation(normal, "density_std", "kg/m^3") / density : percent(normal, "density_std_percent");
+  const VectorXd mass = mass_by_density(normal, layout);
+  std::vector<Given> numbers = entries(GivenNumber::mass, "normal.mass", "kg", rig.normal.inertia);
+  VectorXd shared = relative * mass;
+  if (with_inertia) {
+    const VectorXd inertia = inertia_by_density(normal, layout, rig.rigid_from);
+    const std::vector<Given> more = entries(GivenNumber::inertia, "torsion.inertia", "kg.m^2", rig.torsion.inertia);
+    numbers.insert(numbers.end(), more.begin(), more.end());
+    shared.conservativeResize(mass.size() + inertia.size());
+    shared.tail(inertia.size()) = relative * inertia;
+  }
+  found.array("normal.density", numbers, VectorXd::Zero(shared.size()), shared);
+}
+
 void take_chains(const TomlTable& file, const Rig& rig, Found& found) {
   const TomlTable normal = file.table("normal"), torsion = file.table("torsion");
+  const NormalLayout layout = read_normal_layout(normal);
   take_array(normal, "station", GivenNumber::station, "m", rig.station, found);
   take_array(normal, "mass", GivenNumber::mass, "kg", rig.normal.inertia, found);
+  take_density(normal, layout, rig, !torsion.has("inertia"), found);
+  const auto given = [](const TomlTable& table, const char* key, const char* si, Index count) { return table.has(key) ? table.quantities(key, si, count) : VectorXd(); };
+  take_array(normal, "added_mass", GivenNumber::mass, "kg", given(normal, "added_mass", "kg", rig.station.size()), found);
+  take_array(torsion, "added_inertia", GivenNumber::inertia, "kg.m^2", given(torsion, "added_inertia", "kg.m^2", rig.torsion.inertia.size()), found);
   take_array(normal, "mass_centre", GivenNumber::mass_centre, "m", rig.mass_centre, found);
   take_flexibility(normal, GivenNumber::normal_flexibility, "m/N", rig.normal, found);
   take_array(torsion, "inertia", GivenNumber::inertia, "kg.m^2", rig.torsion.inertia, found);
   take_flexibility(torsion, GivenNumber::torsion_flexibility, "rad/(N.m)", rig.torsion, found);
   if (!normal.has("flexibility")) {
-    const SteppedBeam beam = drawn_beam(normal, rig.station);
+    const SteppedBeam beam = drawn_beam(normal, layout);
     const Index count = rig.station.size();
     take_array(normal, "length", GivenNumber::normal_length, "m", beam.length, found);
     take_array(normal, "youngs_modulus", GivenNumber::youngs_modulus, "Pa", normal.quantities("youngs_modulus", "Pa", count), found);
-    take_array(normal, "second_moment", GivenNumber::second_moment, "m^4", normal.quantities("second_moment", "m^4", count), found);
+    take_array(normal, "second_moment", GivenNumber::second_moment, "m^4", given(normal, "second_moment", "m^4", count), found);
     take_scalar(normal, "clamp_spring", GivenNumber::normal_clamp_spring, "N.m/rad", 1 / beam.clamp_rotation, found);
     take_scalar(normal, "clamp_translation", GivenNumber::clamp_translation, "N/m", 1 / beam.clamp_translation, found);
     found.all().normal_beam = beam;
   }
   if (!torsion.has("flexibility")) {
-    const SteppedBeam shaft = drawn_shaft(torsion, normal);
     const Index count = rig.torsion.inertia.size();
+    const SteppedBeam shaft = drawn_shaft(torsion, normal, layout, count);
     take_array(torsion, "station", GivenNumber::torsion_station, "m", shaft.station, found);
     take_array(torsion, "length", GivenNumber::torsion_length, "m", shaft.length, found);
-    take_array(torsion, "shear_modulus", GivenNumber::shear_modulus, "Pa", torsion.quantities("shear_modulus", "Pa", count), found);
-    if (torsion.has("polar_moment")) take_array(torsion, "polar_moment", GivenNumber::polar_moment, "m^4", torsion.quantities("polar_moment", "m^4", count), found);
+    take_array(torsion, "shear_modulus", GivenNumber::shear_modulus, "Pa", given(torsion, "shear_modulus", "Pa", count), found);
+    take_array(torsion, "polar_moment", GivenNumber::polar_moment, "m^4", given(torsion, "polar_moment", "m^4", count), found);
     take_scalar(torsion, "clamp_spring", GivenNumber::torsion_clamp_spring, "N.m/rad", 1 / shaft.clamp_rotation, found);
     found.all().torsion_beam = shaft;
     found.all().torsion_has_station = torsion.has("station");

@@ -420,7 +420,6 @@ TEST(Rig, WhatCannotBeUsedIsNamedWithItsLine) {
       {"both uncertainties", replaced(beam, "[torsion]", "flexibility.std_percent = 1\nflexibility.std_rows = []\n[torsion]"),
        "side by side"},
       {"negative uncertainty", replaced(beam, "[torsion]", "flexibility.std_percent = -1\n[torsion]"), "negative"},
-      {"no modes", replaced(beam, "modes = \"all\"\n", ""), "lacks the key \"normal.modes\""},
       {"modes by another word", replaced(beam, "\"all\"", "\"every\""),
        "rig.toml:9: normal.modes is \"every\"; wanted \"all\" or a number from 1 to 4"},
       {"no mode at all", replaced(beam, "\"all\"", "0"), "normal.modes is 0"},
