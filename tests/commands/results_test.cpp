@@ -152,6 +152,17 @@ TEST(Results, OfModalRigsHaveTheirNames) {
 }
 
 /// A sine whose record begins in its middle: there is no rest before it from which the motion could be followed.
+/// A low-pass filter in the gauge passes for damping, more of it in one half of a decay than in the other.
+TEST(Results, OfAFitWhoseHalvesDisagreeEndWithStatusOne) {
+  const TemporaryDirectory directory;
+  const std::string folder = std::string(UNRIG_SOURCE_DIR) + "/sample_data/campaigns/lowpass/", out = directory.path("fit.json");
+  const Finished finished = run_unrig(directory, {"fit", "--rig", folder + "rig.toml", folder + "dry_pluck.csv", folder + "wet_pluck.csv", "-o", out});
+  EXPECT_EQ(finished.status, 1);
+  EXPECT_THAT(finished.err, HasSubstr("earlier halves"));
+  EXPECT_THAT(finished.err, HasSubstr("unrig diagnose"));
+  for (const json& p : json::parse(read_text(out))["parameters"]) EXPECT_EQ(p["identified"], false) << p;
+}
+
 TEST(Results, OfACorrectionThatIsWrongEndWithStatusOne) {
   const TemporaryDirectory directory;
   const std::string rig = null_campaign("rig.toml"), fit = directory.path("fit.json");

@@ -313,7 +313,7 @@ TEST(Effects, SayWhyADiagnosisTriesThemOnlyWhereNamed) {
 /// Peaks overlap within half of the sum of their half-power bandwidths.
 TEST(Effects, AModeThatMakesOnePeakWithAKnownOneIsNotDistinct) {
   const Rig rig = two_modes();
-  const AeroelasticModel model = AeroelasticModel(rig, make_basis(rig, 500, 0), wagner(Wagner::jones)).with_effects({"higher-mode"});
+  const AeroelasticModel model = AeroelasticModel(rig, Basis{}, wagner(Wagner::jones)).with_effects({"higher-mode"});
   Eigen::VectorXd theta = model.start_values();
   const double known = rig.modal[0].frequency, width = 0.02;
   theta[model.index("higher-mode.damping_ratio")] = width;
