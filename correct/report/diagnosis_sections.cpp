@@ -98,8 +98,11 @@ void add_missing(ReportPage& page, const json& missing, const std::string& title
   for (const json& m : missing) {
     const std::string effect = text_of(m, "effect");
     if (const std::string equation = text_of(m, "equation"); !equation.empty()) page.add_text(effect + ": " + equation);
-    for (const json& p : member(m, "parameters", json::array()))
-      rows.push_back({effect, text_of(p, "name"), with_error(number_of(p, "value"), number_of(p, "std_error")), text_of(p, "unit") == "1" ? "" : text_of(p, "unit")});
+    if (const std::string advice = text_of(m, "advice"); !advice.empty()) page.add_text(advice + ".");
+    for (const json& p : member(m, "parameters", json::array())) {
+      const std::string stated = p.contains("stated") ? " (the file says " + plain(number_of(p, "stated"), 6) + ")" : "";
+      rows.push_back({effect, text_of(p, "name"), with_error(number_of(p, "value"), number_of(p, "std_error")) + stated, text_of(p, "unit") == "1" ? "" : text_of(p, "unit")});
+    }
   }
   if (!rows.empty()) page.add_table(title, {"effect", "parameter", "value ± one standard error", "unit"}, rows);
 }

@@ -6,12 +6,15 @@
 #include <memory>
 #include <set>
 
+#include <fmt/format.h>
+
 #include "core/effects/effect.h"
 #include "core/files/error.h"
 #include "core/rig/fingerprint.h"
 #include "core/numerics/in_parallel.h"
 #include "fit/search/decays_first.h"
 #include "fit/diagnose/heldout.h"
+#include "fit/diagnose/rig_description.h"
 #include "fit/diagnose/selection.h"
 #include "fit/search/effect_search.h"
 #include "fit/fit_description.h"
@@ -42,22 +45,31 @@ Naming naming_of(const Trial& best, const Trial& baseline, bool clean, bool pred
   return only_signals ? Naming::only_signals : Naming::named;
 }
 
-/// What runs that were not fitted are left with, before and after.
-std::vector<ImprovedRun> predict_unseen(const DiagnoseProblem& problem, const FitProblem& fit_problem, const Arrival& baseline, const Trial& best) {
-  FitProblem after = fit_problem;
-  after.effects = best.effects;
-  const bool leave_out = problem.heldout.empty() && problem.runs.size() > 1 && !best.effects.empty();
+/// A rig and its runs: as the files have them, or as their description was put right.
+struct Setting {
+  const FitProblem* problem;
+  const std::vector<Run>* heldout;
+};
+
+/// What runs that were not fitted are left with, before and after. `best` is of the rig and the runs of `after`.
+std::vector<ImprovedRun> predict_unseen(const Setting& before, const Arrival& baseline, const Setting& after, const Trial& best) {
+  FitProblem after_problem = *after.problem;
+  after_problem.effects = best.effects;
+  const std::vector<Run>& runs = before.problem->runs;
+  const bool changed = !best.effects.empty() || after.problem != before.problem;
+  const bool leave_out = before.heldout->empty() && runs.size() > 1 && changed;
   const std::vector<RunResidual>& fitted = best.arrival.joint.runs();
   const auto has_part = [](const RunResidual& run) { return !run.is_aside(); };
   const bool others_tell = std::count_if(fitted.begin(), fitted.end(), has_part) > 1;
   std::vector<std::size_t> predicted;  // not what no search follows, nor what nothing but itself has told of
-  for (std::size_t i = 0; i < (leave_out ? problem.runs.size() : problem.heldout.size()); ++i)
+  for (std::size_t i = 0; i < (leave_out ? runs.size() : before.heldout->size()); ++i)
     if (!leave_out || (has_part(fitted[i]) && others_tell)) predicted.push_back(i);
   std::vector<ImprovedRun> unseen(predicted.size());
   in_parallel(unseen.size(), [&](std::size_t i) {
-    const Run& run = leave_out ? problem.runs[predicted[i]] : problem.heldout[predicted[i]];
-    const HeldoutResidual b = leave_out ? predict_left_out(baseline, fit_problem, predicted[i]) : predict_heldout(baseline, fit_problem, run);
-    const HeldoutResidual a = leave_out ? predict_left_out(best.arrival, after, predicted[i]) : predict_heldout(best.arrival, after, run);
+    const std::size_t k = predicted[i];
+    const Run& run = leave_out ? runs[k] : (*before.heldout)[k];
+    const HeldoutResidual b = leave_out ? predict_left_out(baseline, *before.problem, k) : predict_heldout(baseline, *before.problem, run);
+    const HeldoutResidual a = leave_out ? predict_left_out(best.arrival, after_problem, k) : predict_heldout(best.arrival, after_problem, (*after.heldout)[k]);
     unseen[i] = {run.file, b.channel, run.channel(b.channel).unit, true, leave_out, b.rms, a.rms, a.noise};
   });
   return unseen;
@@ -92,9 +104,36 @@ bool has_colour(const JointProblem& joint) {
   return std::any_of(joint.runs().begin(), joint.runs().end(), [](const RunResidual& run) { return run.colour(0) != nullptr; });
 }
 
-/// Both fits in full, and what they leave of the fitted runs.
-void describe(const DiagnoseProblem& problem, const FitProblem& fit_problem, const Trial& baseline, const Trial& best, Diagnosis& d) {
-  FitProblem after = fit_problem;
+/// The best set of laws in a setting, and what is to be said of it.
+struct Explanation {
+  Setting setting;
+  Trial best;
+  double cost = 0;  ///< of the setting, as a difference of BIC
+  Mismatch remaining;
+  std::vector<ImprovedRun> unseen;
+  bool predicts = false;
+  FitResult fit = {};
+
+  bool clean() const { return !remaining.found; }
+  bool explains() const { return clean() && predicts; }
+};
+
+Explanation look_at(const DiagnoseProblem& problem, const Setting& files, const Trial& baseline, const Setting& setting, Trial best, double cost) {
+  Explanation e{setting, std::move(best), cost, {}, {}, false};
+  e.remaining = what_remains(e.best);
+  if (!problem.verdict_only) e.unseen = predict_unseen(files, baseline.arrival, setting, e.best);
+  const bool adds_nothing = e.best.effects.empty() && setting.problem == files.problem;
+  e.predicts = adds_nothing || power_over_noise(e.unseen, &ImprovedRun::rms_after) <= power_over_noise(e.unseen, &ImprovedRun::rms_before);
+  return e;
+}
+
+/// Both fits in full, and what they leave of the fitted runs. Of an explanation with the rig's description put right `d.after` is the fit with its laws to the rig as the files have it: no fit is told that
+/// belongs to a rig in no file.
+void describe(const FitProblem& fit_problem, const Trial& baseline, Explanation& e, Diagnosis& d) {
+  const Trial& best = e.best;
+  const bool described = e.setting.problem != &fit_problem;
+  const auto settled = [](const Trial& trial) { return trial.reduced_chi2() < twice_the_noise ? Settle::noise : Settle::nothing; };
+  FitProblem after = *e.setting.problem;
   after.effects = best.effects;
   Arrival before_arrival = baseline.arrival, after_arrival = best.arrival;
   if (d.mismatch.found) {
@@ -103,13 +142,22 @@ void describe(const DiagnoseProblem& problem, const FitProblem& fit_problem, con
     if (plain.baseline_was_lost) d.not_followed.insert(d.not_followed.begin(), std::vector<std::string>{});
   }
   d.before = describe_fit(before_arrival, fit_problem, d.mismatch.found ? Settle::nothing : Settle::noise);  // a fit that explains nothing deserves no refinement
-  d.after = best.effects.empty() ? d.before : describe_fit(after_arrival, after, best.reduced_chi2() < twice_the_noise ? Settle::noise : Settle::nothing);
-  d.bic_after = bic_difference(best, baseline) + (d.bic_before = d.before.bic());
-  for (std::size_t r = 0; r < problem.runs.size(); ++r) {
+  e.fit = best.effects.empty() && !described ? d.before : describe_fit(after_arrival, after, settled(best));
+  d.after = e.fit;
+  if (described && best.effects.empty()) d.after = d.before;
+  if (described && !best.effects.empty()) {
+    FitProblem as_filed = fit_problem;
+    as_filed.effects = best.effects;
+    Trial trial = prepare(as_filed, baseline, best.effects);
+    fit_fully(trial, 6);
+    d.after = describe_fit(trial.arrival, as_filed, settled(trial));
+  }
+  d.bic_after = bic_difference(best, baseline) + e.cost + (d.bic_before = d.before.bic());
+  for (std::size_t r = 0; r < fit_problem.runs.size(); ++r) {
     for (std::size_t c = 0; c < d.before.runs[r].channels.size(); ++c) {
-      const FittedChannel &b = d.before.runs[r].channels[c], &a = d.after.runs[r].channels[c];
+      const FittedChannel &b = d.before.runs[r].channels[c], &a = e.fit.runs[r].channels[c];
       if (b.name == "alpha") continue;
-      d.runs.push_back({problem.runs[r].file, b.name, b.unit, false, false, b.rms_residual, a.rms_residual, std::min(a.noise, b.noise), d.after.runs[r].aside});
+      d.runs.push_back({fit_problem.runs[r].file, b.name, b.unit, false, false, b.rms_residual, a.rms_residual, std::min(a.noise, b.noise), e.fit.runs[r].aside});
     }
   }
 }
@@ -121,16 +169,22 @@ bool is_idle(const JointProblem& joint, const std::string& id) {
   return false;
 }
 
+double probability_of(const std::string& id, const std::vector<Candidate>& ranking) {
+  double sum = 0;
+  for (const Candidate& c : ranking)
+    if (std::find(c.effects.begin(), c.effects.end(), id) != c.effects.end()) sum += c.probability;
+  return sum;
+}
+
 /// The effects of the best set, with their parameters.
-std::vector<MissingEffect> effects_of(const Trial& best, const Diagnosis& d) {
+std::vector<MissingEffect> effects_of(const Explanation& found, const Diagnosis& d) {
+  const Trial& best = found.best;
   std::vector<MissingEffect> set;
   for (const std::string& id : best.effects) {
     if (is_idle(best.arrival.joint, id)) continue;
     const Effect& e = effect(id);
-    MissingEffect m{id, 0, e.equation, e.source, {}};
-    for (const Candidate& c : d.ranking)
-      if (std::find(c.effects.begin(), c.effects.end(), id) != c.effects.end()) m.probability += c.probability;
-    for (const FittedParameter& p : d.after.parameters)
+    MissingEffect m{id, probability_of(id, d.ranking), e.equation, e.source, {}};
+    for (const FittedParameter& p : found.fit.parameters)
       if (p.name.starts_with(id + ".")) m.parameters.push_back(p);
     set.push_back(m);
   }
@@ -138,13 +192,14 @@ std::vector<MissingEffect> effects_of(const Trial& best, const Diagnosis& d) {
 }
 
 /// The sets of `tried` that are as good as the best, each once, in whatever order its effects were found.
-void name_equivalent(const Trial& baseline, const Trial& best, const std::vector<Trial>& tried, bool verdict_only, Diagnosis& d) {
-  const double best_bic = bic_difference(best, baseline);
+void name_equivalent(const Explanation& found, bool described, const std::vector<Trial>& tried, bool verdict_only, Diagnosis& d) {
+  const Trial& best = found.best;
   const auto set_of = [](const Trial& t) { return std::set<std::string>(t.effects.begin(), t.effects.end()); };
-  std::set<std::set<std::string>> named{set_of(best)};
+  std::set<std::set<std::string>> named;
+  if (!described) named.insert(set_of(best));
   for (const Trial& t : tried) {
-    const bool other = t.effects.size() <= best.effects.size() && !named.contains(set_of(t));
-    if (!other || bic_difference(t, baseline) - best_bic >= decisive) continue;
+    const bool other = t.effects.size() <= best.effects.size() + (described ? 1 : 0) && !named.contains(set_of(t));
+    if (!other || bic_difference(t, best) - found.cost >= decisive) continue;
     named.insert(set_of(t));
     d.equivalent.push_back(t.effects);
     d.separated_by.push_back(verdict_only ? std::nullopt : separating_recording(best.arrival, t.arrival));
@@ -178,6 +233,9 @@ void describe_numbers(const DiagnoseProblem& problem, const std::vector<FittedGi
   fit.warnings.push_back("the numbers that state their uncertainty stand at what the fit with nothing missing made of them; standard errors are those with these numbers known");
 }
 
+/// `numbers_known`: what their files state of their uncertainty has been allowed for.
+Diagnosis diagnose_in_order(const DiagnoseProblem& problem, bool numbers_known = false);
+
 /// Of a rig or of runs that state uncertainties: with the numbers that fit the runs best, nothing missing, within what is stated. What they explain is not looked for.
 Diagnosis diagnose_inexact(const DiagnoseProblem& problem) {
   FitProblem stated;
@@ -194,17 +252,48 @@ Diagnosis diagnose_inexact(const DiagnoseProblem& problem) {
   at.rig.givens = nullptr;
   for (Run& run : at.runs) run.givens = nullptr;
   const std::vector<FittedGiven> numbers = inexact.numbers();
-  Diagnosis d = diagnose(at);
+  Diagnosis d = diagnose_in_order(at, true);
   for (FitResult* fit : {&d.before, &d.after}) describe_numbers(problem, numbers, *fit);
   return d;
 }
 
-}  // namespace
+/// The candidate among all others, in words and with what it does to the load.
+MissingEffect missing_description(const RigDescription& description, const Explanation& found, const FitProblem& fit_problem, const Diagnosis& d) {
+  MissingEffect m = description.as_missing();
+  m.probability = probability_of(m.effect, d.ranking);
+  if (const double change = found.fit.parameters.empty() ? 0 : change_of_load(fit_problem, d.before, *description.problem, found.fit); change != 0)
+    m.advice += fmt::format(". With them the loads at the ends of the steps are {:+.2g} % off those of the rig as the file has it", change);
+  return m;
+}
 
-namespace {
+/// The rig's description against the laws that were `found`: with laws beside it where neither explains everything. True where it is the better explanation, then in `found`.
+bool weigh(const DiagnoseProblem& problem, const Setting& files, const Trial& baseline, const RigDescription& description, Selection& selection, Explanation& found) {
+  const std::vector<std::string> itself{rig_description_id};
+  const double against_baseline = bic_difference(description.trial, baseline) + description.cost;
+  selection.add({itself, description.trial.reduced_chi2(), against_baseline, 0, description.promised});
+  if (against_baseline > -decisive) return false;
+  const Setting put_right{description.problem.get(), &description.heldout};
+  Explanation with = look_at(problem, files, baseline, put_right, description.trial, description.cost);
+  if (!with.explains() && !found.explains()) {
+    DiagnoseProblem there = problem;
+    there.rig = description.problem->rig;
+    Selection beside(there, *description.problem, description.trial);
+    with = look_at(problem, files, baseline, put_right, beside.best_set(false), description.cost);
+    for (Candidate c : beside.ranking()) {
+      if (c.effects.empty()) continue;
+      c.effects.insert(c.effects.begin(), itself.front());
+      c.delta_bic += against_baseline;
+      selection.add(std::move(c));
+    }
+  }
+  const bool laws_named = !found.best.effects.empty() && naming_of(found.best, baseline, found.clean(), found.predicts) == Naming::named;
+  if (!with.explains() || (laws_named && bic_difference(found.best, with.best) - with.cost < -decisive)) return false;
+  found = std::move(with);
+  return true;
+}
 
-Diagnosis diagnose_in_order(const DiagnoseProblem& problem) {
-  if (states_errors(problem.rig, problem.runs)) return diagnose_inexact(problem);
+Diagnosis diagnose_in_order(const DiagnoseProblem& problem, bool numbers_known) {
+  if (!numbers_known && states_errors(problem.rig, problem.runs)) return diagnose_inexact(problem);
   const auto begin = std::chrono::steady_clock::now();
   const auto tell = [&](const std::string& what) {
     if (problem.progress) problem.progress(what);
@@ -221,22 +310,24 @@ Diagnosis diagnose_in_order(const DiagnoseProblem& problem) {
   d.mismatch = locate_mismatch(baseline.arrival.joint);
   bool coloured = d.mismatch.found && take_noise_colour(baseline);
   auto selection = std::make_unique<Selection>(problem, fit_problem, baseline);
-  Trial best = selection->best_set(!coloured);
+  Trial best_set = selection->best_set(!coloured);
   if (selection->coloured()) {
     tell("trying what may be missing, in noise of the colour that is left");
     coloured = true;
     take_noise_of(baseline, *selection->coloured());
     selection = std::make_unique<Selection>(problem, fit_problem, baseline);
-    best = selection->best_set(false);
+    best_set = selection->best_set(false);
   }
   if (coloured) d.mismatch = locate_mismatch(baseline.arrival.joint);
   if (!problem.verdict_only) d.maps = residual_maps(baseline.arrival.joint, d.mismatch.runs);
+  const std::optional<RigDescription> description = d.mismatch.found && !numbers_known ? describe_rig(problem, baseline) : std::nullopt;
+  const Setting files{&fit_problem, &problem.heldout};
+  Explanation found = look_at(problem, files, baseline, files, std::move(best_set), 0);
+  const bool described = description && weigh(problem, files, baseline, *description, *selection, found);
+  const Trial& best = found.best;
   d.ranking = selection->ranking();
-  d.remaining = what_remains(best);
-  const bool clean = !d.remaining.found;
-  const std::vector<ImprovedRun> unseen = problem.verdict_only ? std::vector<ImprovedRun>{} : predict_unseen(problem, fit_problem, baseline.arrival, best);
-  const bool predicts = best.effects.empty() || power_over_noise(unseen, &ImprovedRun::rms_after) <= power_over_noise(unseen, &ImprovedRun::rms_before);
-  d.unexplained = d.mismatch.found && !(clean && predicts);
+  d.remaining = found.remaining;
+  d.unexplained = d.mismatch.found && !found.explains();
 
   if (d.unexplained)
     for (const Candidate& c : d.ranking)
@@ -244,16 +335,18 @@ Diagnosis diagnose_in_order(const DiagnoseProblem& problem) {
 
   if (!problem.verdict_only) {
     tell("describing the result");
-    describe(problem, fit_problem, baseline, best, d);
-    for (const ImprovedRun& run : unseen) d.runs.push_back(run);
+    describe(fit_problem, baseline, found, d);
+    for (const ImprovedRun& run : found.unseen) d.runs.push_back(run);
     if (d.unexplained) d.missing_force = missing_forces(best.arrival.joint);
   }
   if (!d.not_followed.empty()) d.search = SearchOutcome::failed;
-  if (!best.effects.empty()) {
-    d.naming = naming_of(best, baseline, clean, predicts);
-    if (d.naming == Naming::named) name_equivalent(baseline, best, selection->tried(), problem.verdict_only, d);
+  if (described) d.missing.push_back(missing_description(*description, found, fit_problem, d));
+  if (described || !best.effects.empty()) {
+    if (!described) d.naming = naming_of(best, baseline, found.clean(), found.predicts);
+    if (d.naming == Naming::named) name_equivalent(found, described, selection->tried(), problem.verdict_only, d);
     else d.removed_by_closest = 1 - best.excess() / baseline.excess();
-    (d.naming == Naming::named ? d.missing : d.closest) = effects_of(best, d);
+    std::vector<MissingEffect>& set = d.naming == Naming::named ? d.missing : d.closest;
+    for (MissingEffect& m : effects_of(found, d)) set.push_back(std::move(m));
   }
   d.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
   return d;

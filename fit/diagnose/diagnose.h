@@ -50,7 +50,11 @@ struct MissingEffect {
   double probability = 0;
   std::string equation, source;
   std::vector<FittedParameter> parameters;
+  std::string advice = {};  ///< what to do about it; of the rig's description only
 };
+
+/// What is missing is an exact rig file or head of a run: no effect, so that core/effects does not know it. Its parameters are the numbers that moved most, `start` what the file says of them.
+constexpr const char* rig_description_id = "rig-description";
 
 /// A channel of a run before and after the effects that were found, before: what `Diagnosis::before` leaves. Of a run that was not fitted its first fitted channel; before: predicted by a fit with runs that it cannot
 /// explain weighted down.
@@ -85,10 +89,12 @@ struct Diagnosis {
 };
 
 /// 1. The best fit with nothing missing, runs that it cannot explain weighted down; its residual is tested for energy and colour.
+///    Where it differs from noise and no number states an uncertainty, the rig's description is the first candidate (fit/diagnose/rig_description.h).
 /// 2. Every candidate is linearised there: how much of the residual could one step in its parameters and the rig's remove?
 /// 3. The promising ones are fitted in full, everything free, while the weights return to those of the noise. They are compared by BIC with each run's
 ///    own variance and with as many samples as the remaining colour leaves independent.
 /// 4. While a mismatch remains a further effect is tried beside the best; an effect that others made superfluous is taken away again.
+/// 5. Where the rig's description leaves nothing, effects are named only if their evidence beats it decisively. Where it leaves something and effects do so too, effects are tried beside it.
 /// An effect is named only where no significant mismatch remains beside the set it belongs to, or nearly all of the excess is gone (which is not enough for signals
 /// with amplitudes of their own in every run), and where runs that were not fitted are predicted better with it than without: those held out or, where there are
 /// none, each fitted run from the others. Otherwise the mismatch is unexplained, and the force is given that would explain it.

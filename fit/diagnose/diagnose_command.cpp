@@ -1,5 +1,7 @@
 #include "fit/diagnose/diagnose_command.h"
 
+#include <algorithm>
+
 #include <CLI/CLI.hpp>
 #include <fmt/format.h>
 
@@ -81,6 +83,8 @@ int diagnose_command(int argc, char** argv) {
   diagnosis.after.command = made.command;
   progress.clear();
   for (const std::string& warning : problem.rig.warnings) warn(warning);
+  const bool rig_is_off = std::any_of(diagnosis.missing.begin(), diagnosis.missing.end(), [](const MissingEffect& m) { return m.effect == rig_description_id; });
+  if (rig_is_off && !fit_output.empty()) warn(fit_output + ": the fit is of the rig as its file has it, which the diagnosis holds for off. State how well its numbers are known, and fit anew");
   const auto whole = [](const std::string& text) { return [&text](const TextSink& sink) { sink(text); }; };
   const std::string told = to_json(diagnosis), fitted = fit_output.empty() ? std::string() : to_json(diagnosis.after);
   write_together({{output, whole(told)}, {fit_output, whole(fitted)}});

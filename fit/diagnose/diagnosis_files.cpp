@@ -97,12 +97,28 @@ std::string search_words(const Diagnosis& d) {
   return text + "Unexplained is what the search left, not what all effects leave. Look at rig file and runs, diagnose fewer runs, or name candidates with --effects.";
 }
 
+bool is_rig_description(const MissingEffect& m) { return m.effect == rig_description_id; }
+
+/// "normal.mass[13] = 0.871 +/- 0.004 kg where the rig file says 0.86".
+std::string moved_number(const FittedParameter& p) {
+  return fmt::format("{} = {:.5g} +/- {:.2g}{} where {} {:.5g}", p.name, p.value, p.std_error, p.unit == "1" ? "" : " " + p.unit, p.run.empty() ? "the rig file says" : "the run " + base_name(p.run) + " says", p.start);
+}
+
+/// The verdict where the rig's description is what is missing, alone or beside effects.
+std::string verdict_on_rig(const MissingEffect& rig, const std::vector<std::string>& others) {
+  const std::string more = rig.parameters.size() > 1 ? fmt::format(", and {} more below", rig.parameters.size() - 1) : "", number = moved_number(rig.parameters.front());
+  if (others.empty()) return fmt::format("Missing is nothing but an exact rig file: {}{}.", number, more);
+  return fmt::format("Missing is {}, and an exact rig file: {}{}.", fmt::join(others, " and "), number, more);
+}
+
 std::string verdict(const Diagnosis& d) {
   if (!d.mismatch.found) return "Nothing is missing: " + d.mismatch.summary + ".";
   if (d.missing.empty())
     return d.search == SearchOutcome::failed ? "There is a mismatch, and the search for what removes it failed in part: unexplained." : "There is a mismatch that no known effect removes: unexplained.";
   std::vector<std::string> ids;
-  for (const MissingEffect& m : d.missing) ids.push_back(m.effect);
+  for (const MissingEffect& m : d.missing)
+    if (!is_rig_description(m)) ids.push_back(m.effect);
+  if (const auto rig = std::find_if(d.missing.begin(), d.missing.end(), is_rig_description); rig != d.missing.end()) return verdict_on_rig(*rig, ids);
   return fmt::format("Missing is {}{}.", fmt::join(ids, " and "), d.unexplained ? "; something remains unexplained" : "");
 }
 
@@ -112,10 +128,12 @@ ordered_json effects_json(const std::vector<MissingEffect>& effects) {
     ordered_json parameters = ordered_json::array();
     for (const FittedParameter& p : m.parameters) {
       ordered_json one = {{"name", p.name}, {"value", number(p.value)}, {"std_error", number(p.std_error)}, {"unit", p.unit}};
+      if (is_rig_description(m)) one["stated"] = number(p.start);
       if (!p.run.empty()) one["run"] = p.run;
       parameters.push_back(one);
     }
     list.push_back({{"effect", m.effect}, {"probability", number(m.probability)}, {"equation", m.equation}, {"source", m.source}, {"parameters", parameters}});
+    if (!m.advice.empty()) list.back()["advice"] = m.advice;
   }
   return list;
 }
@@ -123,11 +141,16 @@ ordered_json effects_json(const std::vector<MissingEffect>& effects) {
 std::string effects_text(const std::vector<MissingEffect>& effects) {
   std::string text;
   for (const MissingEffect& m : effects) {
-    text += fmt::format("[[{}]] probability {:.4f} among the sets tried\n    {}    ({})\n", m.effect, m.probability, m.equation, m.source);
+    text += fmt::format("[[{}]] probability {:.4f} among the sets tried\n    {}{}\n", m.effect, m.probability, m.equation, m.source.empty() ? "" : "    (" + m.source + ")");
     for (const FittedParameter& p : m.parameters) {
+      if (is_rig_description(m)) {
+        text += "    " + moved_number(p) + "\n";
+        continue;
+      }
       const std::string error = p.std_error > 0 ? fmt::format(" +/- {:.2g}", p.std_error) : std::string();
       text += fmt::format("    {} = {:.6g}{} {}{}{}\n", p.name, p.value, error, p.unit, p.run.empty() ? "" : " (" + base_name(p.run) + ")", p.identified ? "" : " (not identified)");
     }
+    if (!m.advice.empty()) text += "    " + m.advice + ".\n";
   }
   return text;
 }

@@ -29,6 +29,8 @@ class Selection {
 
   /// Sets that were fitted in rounds from which the search went on.
   const std::vector<Trial>& tried() const { return tried_; }
+  /// A set that was tried elsewhere.
+  void add(Candidate candidate) { ranking_.push_back(std::move(candidate)); }
   /// All sets that were fitted and the baseline, the best first.
   std::vector<Candidate> ranking() const;
 

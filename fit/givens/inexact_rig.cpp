@@ -1,6 +1,7 @@
 #include "fit/givens/inexact_rig.h"
 
 #include <Eigen/Cholesky>
+#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <stdexcept>
@@ -73,6 +74,22 @@ InexactRig::Candidate InexactRig::moved(const Arrival& from, const Step& step, d
   }
   solve(next);
   return {there, std::move(problem), std::move(next)};
+}
+
+double InexactRig::promises(const Arrival& arrival) {
+  slopes_ = number_slopes(arrival, numbers_, z_);
+  const double length = next_step(arrival).length;
+  return length * length;
+}
+
+double InexactRig::cost_of_deviations(const Arrival& arrival) const {
+  const JointInformation information = joint_information(arrival.joint, *slopes_);
+  const auto count = static_cast<Index>(information.free.size()), deviations = z_.size();
+  const VectorXd scale = information.of_data.diagonal().head(count).cwiseMax(1e-300).cwiseSqrt().cwiseInverse();
+  const MatrixXd of_parameters = scale.asDiagonal() * information.of_data.topLeftCorner(count, count) * scale.asDiagonal(), with = scale.asDiagonal() * information.of_data.topRightCorner(count, deviations);
+  const MatrixXd left = information.of_data.bottomRightCorner(deviations, deviations) - with.transpose() * of_parameters.ldlt().solve(with);
+  const VectorXd known = Eigen::SelfAdjointEigenSolver<MatrixXd>(left).eigenvalues().cwiseMax(0);  // rounding takes those of what nothing tells below zero
+  return z_.squaredNorm() + known.array().log1p().sum();
 }
 
 std::vector<Run> InexactRig::runs() const {

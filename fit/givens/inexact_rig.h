@@ -22,6 +22,8 @@ class InexactRig {
   /// `stated` must outlive this.
   explicit InexactRig(const FitProblem& stated);
 
+  /// How far chi-square + z^T z would fall by one step in parameters and deviations from a fit at the present numbers, were both linear.
+  double promises(const Arrival& arrival);
   /// From a fit at the present numbers (at first the stated ones) to the best of both. The runs of `arrival` are this object's from then on.
   void search(Arrival& arrival);
 
@@ -29,6 +31,11 @@ class InexactRig {
   Rig rig() const { return numbers_.rig_at(z_); }
   std::vector<Run> runs() const;
   std::vector<FittedGiven> numbers() const;
+  const StatedNumbers& stated_numbers() const { return numbers_; }
+  const Eigen::VectorXd& deviations() const { return z_; }
+  /// What the deviations z cost in twice the logarithm of the evidence at the end of a search, by Laplace's approximation: z^T z + ln det(I + K), K what the runs say of z with the parameters eliminated
+  /// (D. J. C. MacKay, Neural Computation 4 (1992) 415).
+  double cost_of_deviations(const Arrival& arrival) const;
 
   /// Covariance of the unknowns, numbers included, at the end of a search.
   InexactUncertainty uncertainty(const Arrival& arrival) const { return inexact_uncertainty(arrival.joint, &*slopes_); }

@@ -253,8 +253,10 @@ bool take_noise_colour(Trial& trial) {
 }
 
 void take_noise_of(Trial& trial, const Trial& other) {
+  const std::vector<RunResidual>& known = other.arrival.joint.runs();
+  if (std::none_of(known.begin(), known.end(), [](const RunResidual& run) { return run.colour(0) != nullptr; })) return;
   JointProblem& joint = trial.arrival.joint;
-  for (std::size_t r = 0; r < joint.runs().size(); ++r) joint.runs()[r].keep_noise_of(other.arrival.joint.runs()[r]);
+  for (std::size_t r = 0; r < joint.runs().size(); ++r) joint.runs()[r].keep_noise_of(known[r]);
   fit_fully(trial, 5);
 }
 

@@ -51,7 +51,7 @@ Trial fit_baseline(const FitProblem& problem);
 
 /// Gives each run noise of the colour that is left of all of them at rest (noise_colours), in its own size, and fits again. False, and nothing done, where that is white.
 bool take_noise_colour(Trial& trial);
-/// Gives the runs of `trial` the noise of those of `other`, and fits again.
+/// Gives the runs of `trial` the noise of those of `other`, and fits again, where that has a colour.
 void take_noise_of(Trial& trial, const Trial& other);
 
 /// One linear step from `base` with `effects` (those of base and one more): what would it remove?

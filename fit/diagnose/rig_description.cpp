@@ -1,0 +1,129 @@
+#include "fit/diagnose/rig_description.h"
+
+#include <algorithm>
+#include <cmath>
+#include <set>
+#include <utility>
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include "core/rig/default_errors.h"
+#include "fit/givens/inexact_rig.h"
+
+namespace unrig {
+namespace {
+
+using Eigen::Index;
+using Eigen::VectorXd;
+
+/// Rig and runs that state what is usual.
+FitProblem with_usual_errors(const DiagnoseProblem& problem) {
+  FitProblem usual;
+  usual.rig = problem.rig;
+  usual.rig.givens = std::make_shared<const Givens>(usual_errors(problem.rig));
+  usual.runs = problem.runs;
+  usual.circulation = problem.circulation;
+  for (Run& run : usual.runs) run.givens = std::make_shared<const Givens>(usual_errors(run));
+  return usual;
+}
+
+/// Runs that took no part, with the errors that all runs share.
+std::vector<Run> moved_heldout(const DiagnoseProblem& problem, const FitProblem& usual, const VectorXd& z) {
+  std::vector<Run> all = usual.runs, moved;
+  for (const Run& run : problem.heldout) {
+    all.push_back(run);
+    all.back().givens = std::make_shared<const Givens>(usual_errors(run));
+  }
+  const StatedNumbers numbers(usual.rig, all);
+  VectorXd known = VectorXd::Zero(numbers.deviations());
+  known.head(z.size()) = z;
+  for (std::size_t i = usual.runs.size(); i < all.size(); ++i) {
+    moved.push_back(numbers.run_at(i, known));
+    moved.back().givens = nullptr;
+  }
+  return moved;
+}
+
+/// How a rig file or a head states such an error: "mass.std_percent = 1.4".
+std::string statement(const FittedGiven& given) {
+  const std::string of_array = given.name.substr(0, given.name.find('['));
+  const std::string key = of_array.substr(of_array.find('.') + 1);
+  const double per_cent = 100 * given.stated_std / std::abs(given.stated);
+  if (!given.run.empty() || of_array == given.name) return fmt::format("{}{}_std_percent = {:.2g}", given.run.empty() ? "" : "# ", key, per_cent);
+  if (key == "station") return fmt::format("{}.std = \"{:.2g} {}\"", key, given.stated_std, given.unit);
+  return fmt::format("{}.std_percent = {:.2g}", key, per_cent);
+}
+
+double load_of(const FitProblem& problem, const FitResult& fit, const Run& run) {
+  for (const FittedParameter& p : fit.parameters)
+    if (p.name == "normal_force_slope" && p.run == run.file) return p.value * run.density * run.speed * run.speed * problem.rig.chord * problem.rig.strip_length;
+  return 0;
+}
+
+}  // namespace
+
+MissingEffect RigDescription::as_missing() const {
+  constexpr std::size_t most = 5;
+  const auto shift = [](const FittedGiven& given) { return std::abs(given.value - given.stated) / given.stated_std; };
+  std::vector<FittedGiven> by_shift = numbers;
+  std::stable_sort(by_shift.begin(), by_shift.end(), [&](const FittedGiven& a, const FittedGiven& b) { return shift(a) > shift(b); });
+  MissingEffect missing{rig_description_id, 0, "the rig file or a run's head is off", "", {}, ""};
+  std::set<std::string> named;  // the runs share the errors of their heads
+  std::vector<std::string> statements;
+  for (const FittedGiven& given : by_shift) {
+    if (missing.parameters.size() == most || (!missing.parameters.empty() && shift(given) < 1)) break;
+    if (!named.insert(given.name).second) continue;
+    FittedParameter p;
+    p.name = given.name;
+    p.unit = given.unit;
+    p.run = given.run;
+    p.value = given.value;
+    p.std_error = given.std_error;
+    p.start = given.stated;
+    missing.parameters.push_back(std::move(p));
+    if (const std::string how = statement(given); std::find(statements.begin(), statements.end(), how) == statements.end()) statements.push_back(how);
+  }
+  missing.advice = fmt::format("Measure these again, or state how well they are known ({}): fit, correct and diagnose then find them with the rest", fmt::join(statements, "; "));
+  return missing;
+}
+
+double change_of_load(const FitProblem& from, const FitResult& before, const FitProblem& to, const FitResult& after) {
+  double sum = 0, count = 0;
+  for (std::size_t r = 0; r < from.runs.size(); ++r) {
+    const double was = load_of(from, before, from.runs[r]), is = load_of(to, after, to.runs[r]);
+    if (was != 0 && is != 0) sum += 100 * (is / was - 1), ++count;
+  }
+  return count > 0 ? sum / count : 0;
+}
+
+std::optional<RigDescription> describe_rig(const DiagnoseProblem& problem, const Trial& baseline) {
+  if (problem.progress) problem.progress("looking at the rig's description");
+  const FitProblem usual = with_usual_errors(problem);
+  InexactRig inexact(usual);
+  Arrival arrival = baseline.arrival;
+  double freedom = 0;
+  for (RunResidual& run : arrival.joint.runs()) {
+    run.temper(1);
+    freedom += static_cast<double>(run.degrees_of_freedom());
+  }
+  constexpr double half = 0.5;
+  const double promised = inexact.promises(arrival) / (arrival.joint.chi2() - freedom);
+  if (!(promised > half)) return {};
+
+  inexact.search(arrival);
+  auto moved = std::make_shared<FitProblem>();
+  moved->rig = inexact.rig();
+  moved->runs = inexact.runs();
+  moved->circulation = usual.circulation;
+  moved->rig.givens = nullptr;
+  for (Run& run : moved->runs) run.givens = nullptr;
+  RigDescription description{moved, moved_heldout(problem, usual, inexact.deviations()), fit_baseline(*moved), promised, inexact.cost_of_deviations(arrival), inexact.numbers()};
+  take_noise_of(description.trial, baseline);
+  const Eigen::MatrixXd& spread = inexact.stated_numbers().spread();
+  const Eigen::MatrixXd covariance = spread * inexact.uncertainty(arrival).of_deviations * spread.transpose();
+  for (std::size_t i = 0; i < description.numbers.size(); ++i) description.numbers[i].std_error = std::sqrt(covariance(static_cast<Index>(i), static_cast<Index>(i)));
+  return description;
+}
+
+}  // namespace unrig

@@ -1,0 +1,36 @@
+#pragma once
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "fit/diagnose/diagnose.h"
+#include "fit/search/effect_search.h"
+
+namespace unrig {
+
+/// The rig file and the heads of the runs as a candidate for what a baseline leaves: their numbers off by what is usual where nobody states it (core/rig/default_errors.h).
+struct RigDescription {
+  std::shared_ptr<const FitProblem> problem;  ///< rig and runs as they come out; `trial` looks at them
+  std::vector<Run> heldout;                   ///< likewise
+  Trial trial;                                ///< the best fit with nothing missing there
+  double promised = 0;                        ///< share of the excess of chi-square that one linear step promised to remove
+  double cost = 0;                            ///< z^T z + ln det(I + K), to be added to a difference of BIC
+  std::vector<FittedGiven> numbers;           ///< all of them, with their errors
+
+  /// As something missing. Its parameters are the numbers that moved most in units of the usual error, those by one standard deviation or more: five at most, one at least; `start` is what the file says.
+  MissingEffect as_missing() const;
+};
+
+/// Parameters and numbers together, from the baseline:
+///
+///   least of chi-square(theta, z) + z^T z,   twice the logarithm of the evidence = -(difference of BIC + z^T z + ln det(I + K)),
+///
+/// z independent standard normal deviations of the numbers, K what the runs say of z with theta eliminated (fit/givens/inexact_rig.h). None where one linear step would leave more than half of the
+/// excess of chi-square.
+std::optional<RigDescription> describe_rig(const DiagnoseProblem& problem, const Trial& baseline);
+
+/// By how many per cent the loads at the ends of the steps change from one fit to another, on the mean; 0 where no run is a step. Load: s rho U^2 b L of a strip (core/model/strip_theory.h).
+double change_of_load(const FitProblem& from, const FitResult& before, const FitProblem& to, const FitResult& after);
+
+}  // namespace unrig
