@@ -271,14 +271,14 @@ bool weigh(const DiagnoseProblem& problem, const Setting& files, const Trial& ba
   const std::vector<std::string> itself{rig_description_id};
   const double against_baseline = bic_difference(description.trial, baseline) + description.cost;
   selection.add({itself, description.trial.reduced_chi2(), against_baseline, 0, description.promised});
-  if (against_baseline > -decisive) return false;
+  if (found.explains() && against_baseline > -decisive) return false;
   const Setting put_right{description.problem.get(), &description.heldout};
   Explanation with = look_at(problem, files, baseline, put_right, description.trial, description.cost);
   if (!with.explains() && !found.explains()) {
     DiagnoseProblem there = problem;
     there.rig = description.problem->rig;
     Selection beside(there, *description.problem, description.trial);
-    with = look_at(problem, files, baseline, put_right, beside.best_set(false), description.cost);
+    with = look_at(problem, files, baseline, put_right, beside.best_set(), description.cost);
     for (Candidate c : beside.ranking()) {
       if (c.effects.empty()) continue;
       c.effects.insert(c.effects.begin(), itself.front());
@@ -309,18 +309,30 @@ Diagnosis diagnose_in_order(const DiagnoseProblem& problem, bool numbers_known) 
   Diagnosis d;
   d.mismatch = locate_mismatch(baseline.arrival.joint);
   bool coloured = d.mismatch.found && take_noise_colour(baseline);
-  auto selection = std::make_unique<Selection>(problem, fit_problem, baseline);
-  Trial best_set = selection->best_set(!coloured);
-  if (selection->coloured()) {
-    tell("trying what may be missing, in noise of the colour that is left");
-    coloured = true;
-    take_noise_of(baseline, *selection->coloured());
-    selection = std::make_unique<Selection>(problem, fit_problem, baseline);
-    best_set = selection->best_set(false);
-  }
   if (coloured) d.mismatch = locate_mismatch(baseline.arrival.joint);
+  std::optional<RigDescription> description = d.mismatch.found && !numbers_known ? describe_rig(problem, baseline) : std::nullopt;
+  // What a set leaves may be noise that is not white, in which all is to be held against each other anew, or the rig's description.
+  bool anew = false;
+  const auto noise_or_rig = [&](const Trial& set) {
+    if (Trial there = set; !coloured && take_noise_colour(there)) {
+      take_noise_of(baseline, there);
+      return coloured = anew = true;
+    }
+    if (numbers_known || (description && description->left < explained)) return false;
+    std::optional<RigDescription> beside = describe_rig(problem, set);
+    if (!beside || beside->left > explained) return false;
+    description = std::move(beside);
+    return true;
+  };
+  auto selection = std::make_unique<Selection>(problem, fit_problem, baseline);
+  Trial best_set = selection->best_set(noise_or_rig);
+  if (anew) {
+    tell("trying what may be missing, in noise of the colour that is left");
+    d.mismatch = locate_mismatch(baseline.arrival.joint);
+    selection = std::make_unique<Selection>(problem, fit_problem, baseline);
+    best_set = selection->best_set(noise_or_rig);
+  }
   if (!problem.verdict_only) d.maps = residual_maps(baseline.arrival.joint, d.mismatch.runs);
-  const std::optional<RigDescription> description = d.mismatch.found && !numbers_known ? describe_rig(problem, baseline) : std::nullopt;
   const Setting files{&fit_problem, &problem.heldout};
   Explanation found = look_at(problem, files, baseline, files, std::move(best_set), 0);
   const bool described = description && weigh(problem, files, baseline, *description, *selection, found);

@@ -97,11 +97,12 @@ double change_of_load(const FitProblem& from, const FitResult& before, const Fit
   return count > 0 ? sum / count : 0;
 }
 
-std::optional<RigDescription> describe_rig(const DiagnoseProblem& problem, const Trial& baseline) {
+std::optional<RigDescription> describe_rig(const DiagnoseProblem& problem, const Trial& from) {
   if (problem.progress) problem.progress("looking at the rig's description");
-  const FitProblem usual = with_usual_errors(problem);
+  FitProblem usual = with_usual_errors(problem);
+  usual.effects = from.effects;
   InexactRig inexact(usual);
-  Arrival arrival = baseline.arrival;
+  Arrival arrival = from.arrival;
   double freedom = 0;
   for (RunResidual& run : arrival.joint.runs()) {
     run.temper(1);
@@ -118,8 +119,8 @@ std::optional<RigDescription> describe_rig(const DiagnoseProblem& problem, const
   moved->circulation = usual.circulation;
   moved->rig.givens = nullptr;
   for (Run& run : moved->runs) run.givens = nullptr;
-  RigDescription description{moved, moved_heldout(problem, usual, inexact.deviations()), fit_baseline(*moved), promised, inexact.cost_of_deviations(arrival), inexact.numbers()};
-  take_noise_of(description.trial, baseline);
+  RigDescription description{moved, moved_heldout(problem, usual, inexact.deviations()), fit_baseline(*moved), promised, arrival.joint.chi2() / freedom, inexact.cost_of_deviations(arrival), inexact.numbers()};
+  take_noise_of(description.trial, from);
   const Eigen::MatrixXd& spread = inexact.stated_numbers().spread();
   const Eigen::MatrixXd covariance = spread * inexact.uncertainty(arrival).of_deviations * spread.transpose();
   for (std::size_t i = 0; i < description.numbers.size(); ++i) description.numbers[i].std_error = std::sqrt(covariance(static_cast<Index>(i), static_cast<Index>(i)));

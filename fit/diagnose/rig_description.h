@@ -15,6 +15,7 @@ struct RigDescription {
   std::vector<Run> heldout;                   ///< likewise
   Trial trial;                                ///< the best fit with nothing missing there
   double promised = 0;                        ///< share of the excess of chi-square that one linear step promised to remove
+  double left = 0;                            ///< reduced chi-square of the fit that the numbers were found with, laws included
   double cost = 0;                            ///< z^T z + ln det(I + K), to be added to a difference of BIC
   std::vector<FittedGiven> numbers;           ///< all of them, with their errors
 
@@ -22,13 +23,13 @@ struct RigDescription {
   MissingEffect as_missing() const;
 };
 
-/// Parameters and numbers together, from the baseline:
+/// Parameters and numbers together, from a fit of the rig, with laws or without:
 ///
 ///   least of chi-square(theta, z) + z^T z,   twice the logarithm of the evidence = -(difference of BIC + z^T z + ln det(I + K)),
 ///
 /// z independent standard normal deviations of the numbers, K what the runs say of z with theta eliminated (fit/givens/inexact_rig.h). None where one linear step would leave more than half of the
 /// excess of chi-square.
-std::optional<RigDescription> describe_rig(const DiagnoseProblem& problem, const Trial& baseline);
+std::optional<RigDescription> describe_rig(const DiagnoseProblem& problem, const Trial& from);
 
 /// By how many per cent the loads at the ends of the steps change from one fit to another, on the mean; 0 where no run is a step. Load: s rho U^2 b L of a strip (core/model/strip_theory.h).
 double change_of_load(const FitProblem& from, const FitResult& before, const FitProblem& to, const FitResult& after);

@@ -253,7 +253,7 @@ void Selection::try_with_all_modes(Trials& tried) {
   std::stable_partition(tried.begin(), tried.end(), plausible);
 }
 
-Trial Selection::best_set(bool in_white_noise) {
+Trial Selection::best_set(const std::function<bool(const Trial&)>& enough) {
   Trial best = baseline_;
   std::optional<Trial> sufficient;  // a law that is followed all but exactly: what it leaves has a name only where that leaves nothing
   Strings hopeless;  // laws with which alone the fit is worse than without: from that far away they are not found, and are not tried again before half of the way is gone
@@ -276,10 +276,7 @@ Trial Selection::best_set(bool in_white_noise) {
     best = exchanged(without_superfluous(next), hopeless);
     judge_decays(best);
     std::move(tried.begin(), tried.end(), std::back_inserter(tried_));
-    if (in_white_noise && what_remains(best).found) {
-      Trial coloured = best;
-      if (take_noise_colour(coloured)) return *(coloured_ = std::move(coloured));
-    }
+    if (enough && what_remains(best).found && enough(best)) return best;
   }
   return sufficient && what_remains(best).found ? *sufficient : best;
 }

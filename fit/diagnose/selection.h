@@ -22,10 +22,8 @@ class Selection {
   /// Looks at all three as long as it lives.
   Selection(const DiagnoseProblem& problem, const FitProblem& fit_problem, const Trial& baseline);
 
-  /// `baseline` itself where no mismatch is found or no effect is worth it. `in_white_noise`: it ends where what a set leaves is noise that is not white; all sets are to be held against that then.
-  Trial best_set(bool in_white_noise);
-  /// The set beside which the noise was seen to have a colour.
-  const std::optional<Trial>& coloured() const { return coloured_; }
+  /// `baseline` itself where no mismatch is found or no effect is worth it. It ends, too, with a set that leaves something where `enough` says so.
+  Trial best_set(const std::function<bool(const Trial&)>& enough = {});
 
   /// Sets that were fitted in rounds from which the search went on.
   const std::vector<Trial>& tried() const { return tried_; }
@@ -49,7 +47,6 @@ class Selection {
   const FitProblem& fit_problem_;
   const Trial& baseline_;
   std::vector<Trial> tried_;
-  std::optional<Trial> coloured_;
   std::vector<Candidate> ranking_;
 };
 
