@@ -233,6 +233,14 @@ void describe_numbers(const DiagnoseProblem& problem, const std::vector<FittedGi
   fit.warnings.push_back("the numbers that state their uncertainty stand at what the fit with nothing missing made of them; standard errors are those with these numbers known");
 }
 
+/// Whether noise of a colour, at rest, explains all that a fit leaves; if so, the fit is in that noise from then on.
+bool explained_by_noise(Trial& trial) {
+  Trial coloured = trial;
+  if (!take_noise_colour(coloured) || what_remains(coloured).found) return false;
+  trial = std::move(coloured);
+  return true;
+}
+
 /// `numbers_known`: what their files state of their uncertainty has been allowed for.
 Diagnosis diagnose_in_order(const DiagnoseProblem& problem, bool numbers_known = false);
 
@@ -308,13 +316,13 @@ Diagnosis diagnose_in_order(const DiagnoseProblem& problem, bool numbers_known) 
   refuse_short_runs(baseline.arrival.joint);
   Diagnosis d;
   d.mismatch = locate_mismatch(baseline.arrival.joint);
-  bool coloured = d.mismatch.found && take_noise_colour(baseline);
+  bool coloured = d.mismatch.found && explained_by_noise(baseline);
   if (coloured) d.mismatch = locate_mismatch(baseline.arrival.joint);
   std::optional<RigDescription> description = d.mismatch.found && !numbers_known ? describe_rig(problem, baseline) : std::nullopt;
   // What a set leaves may be noise that is not white, in which all is to be held against each other anew, or the rig's description.
   bool anew = false;
   const auto noise_or_rig = [&](const Trial& set) {
-    if (Trial there = set; !coloured && take_noise_colour(there)) {
+    if (Trial there = set; !coloured && explained_by_noise(there)) {
       take_noise_of(baseline, there);
       return coloured = anew = true;
     }

@@ -37,14 +37,12 @@ RunResidual::Colours RunResidual::colours(const VectorXd& theta, const std::vect
 void RunResidual::set_colours(const VectorXd& theta, const Colours& colours) {
   const Prediction p = predict(theta);
   colour_ = colours;
-  whitened_ = (weight_.array() > 0).select(measured_, p.output);  // left-out readings have no innovation of their own
+  measured_ = (weight_.array() > 0).select(measured_, p.output);  // left-out readings have no innovation of their own
   for (std::size_t c = 0; c < channels_.size(); ++c) {
     if (!colour_[c]) continue;
     const WhiteningFilter filter(*colour_[c], run_->dt);
-    const auto column = static_cast<Index>(c);
-    weight_.col(column) *= sigma_[c] / filter.sigma();
+    weight_.col(static_cast<Index>(c)) *= sigma_[c] / filter.sigma();
     sigma_[c] = filter.sigma();
-    whitened_.col(column) = filter.filtered(whitened_.col(column));
   }
   take_colour(*this);
 }
@@ -61,16 +59,22 @@ double RunResidual::log_noise_density() const {
 }
 
 void RunResidual::take_colour(const RunResidual& other) {
-  if (&other != this) colour_ = other.colour_, whitened_ = other.whitened_;
+  if (&other != this) {
+    colour_ = other.colour_;
+    measured_ = (weight_.array() > 0).select(measured_, other.measured_);
+  }
   filters_.clear();
+  whitened_.resize(0, 0);
   const Index before = unknowns_, ends = unknowns_ - first_offset_;  // offsets and the angle before the motion
   while (!free_.empty() && free_.back() >= states_) free_.pop_back();
   const auto of_model = static_cast<Index>(free_.size());
   Index states = states_;
-  for (const std::optional<NoiseColour>& colour : colour_) {
-    if (!colour) continue;
-    filters_.emplace_back(*colour, run_->dt);
+  for (std::size_t c = 0; c < colour_.size(); ++c) {
+    if (!colour_[c]) continue;
+    filters_.emplace_back(*colour_[c], run_->dt);
     for (Index i = 0; i < filters_.back().states(); ++i) free_.push_back(states++);
+    if (whitened_.size() == 0) whitened_ = measured_;
+    whitened_.col(static_cast<Index>(c)) = filters_.back().filtered(measured_.col(static_cast<Index>(c)));
   }
   if (!filters_.empty()) shared_.reset();  // responses behind filters are this run's own
   lay_out();

@@ -33,7 +33,7 @@ TEST(DefaultErrors, MassesAreOffEachByItselfAndTogether) {
 }
 
 TEST(DefaultErrors, HeadsOfRunsAreOffTogether) {
-  const Run step = read_run(test::null_campaign("step_a.csv")), pluck = read_run(test::null_campaign("dry_pluck.csv"));
+  const unrig::Run step = read_run(test::null_campaign("step_a.csv")), pluck = read_run(test::null_campaign("dry_pluck.csv"));
   const Givens usual = usual_errors(step);
   EXPECT_NEAR(std_of(usual, "speed"), 0.01 * step.speed, 1e-12);
   EXPECT_NEAR(std_of(usual, "clock"), 0.001, 1e-12);

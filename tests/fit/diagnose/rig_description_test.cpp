@@ -8,6 +8,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include "core/rig/givens.h"
 #include "fit/diagnose/diagnosis_files.h"
 #include "fit/diagnose/selection.h"
 #include "tests/support/sample_data.h"
