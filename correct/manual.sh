@@ -31,6 +31,8 @@ STATUS
 printf '.SH EXAMPLES\n'
 verbatim << 'EXAMPLES'
 unrig new rig --from tube -o rig.toml
+unrig import log.csv --template -o map.toml
+unrig import log_1.csv log_2.csv --map map.toml --set speed="0.6 m/s" -o runs/
 unrig check --rig rig.toml dry_pluck.csv wet_pluck.csv step_a.csv
 unrig fit --rig rig.toml dry_pluck.csv wet_pluck.csv step_a.csv -o fit.json
 unrig correct --rig rig.toml --fit fit.json step_a.csv -o corrected.csv --indicial indicial.csv

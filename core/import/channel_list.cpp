@@ -32,7 +32,20 @@ ChannelRange range_of_channel(const std::vector<double>& values) {
   return range;
 }
 
-/// The rate of a column of times, in Hz: its values increase by one step; 0 where they do not, or are in no unit of time.
+std::string cell(double x) { return std::isfinite(x) ? fmt::format("{:.5g}", x) : "-"; }
+
+std::string remarks_of(const RecordedChannel& channel, std::size_t missing) {
+  std::string text;
+  const auto add = [&](const std::string& remark) { text += (text.empty() ? "  " : ", ") + remark; };
+  if (!channel.label.empty()) add(fmt::format("\"{}\"", channel.label));
+  if (!channel.remark.empty()) add(channel.remark);
+  if (missing > 0) add(fmt::format("{} missing", missing));
+  if (!channel.raw.empty()) add("UNSCALED: " + channel.raw);
+  return text;
+}
+
+}  // namespace
+
 double rate_of_times(const RecordedChannel& channel) {
   const std::vector<double>& t = channel.value;
   if (t.size() < 3 || channel.unit.empty()) return 0;
@@ -47,20 +60,6 @@ double rate_of_times(const RecordedChannel& channel) {
     return 0;
   }
 }
-
-std::string cell(double x) { return std::isfinite(x) ? fmt::format("{:.5g}", x) : "-"; }
-
-std::string remarks_of(const RecordedChannel& channel, std::size_t missing) {
-  std::string text;
-  const auto add = [&](const std::string& remark) { text += (text.empty() ? "  " : ", ") + remark; };
-  if (!channel.label.empty()) add(fmt::format("\"{}\"", channel.label));
-  if (!channel.remark.empty()) add(channel.remark);
-  if (missing > 0) add(fmt::format("{} missing", missing));
-  if (!channel.raw.empty()) add("UNSCALED: " + channel.raw);
-  return text;
-}
-
-}  // namespace
 
 std::string channel_list(const Recording& recording) {
   double rate = 0;

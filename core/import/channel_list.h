@@ -9,4 +9,7 @@ namespace unrig {
 /// (core/run/motion.h). A rate is the file's, or that of a column of evenly spaced times. Behind them stands what else is to be known of a channel.
 std::string channel_list(const Recording& recording);
 
+/// The rate [Hz] of a column of times: its values increase by one step, in a unit of time; 0 where they do not.
+double rate_of_times(const RecordedChannel& channel);
+
 }  // namespace unrig

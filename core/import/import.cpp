@@ -10,6 +10,8 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include "core/files/near_word.h"
+#include "core/files/scan.h"
 #include "core/run/column_names.h"
 #include "core/import/bridge.h"
 #include "core/import/delimited.h"
@@ -181,14 +183,31 @@ void warn_of_names(const TomlTable& mapping, const std::string& mapping_file, co
     warnings.push_back(fmt::format("{}: the run has neither a column \"gauge\" nor \"alpha\"; its readings count only where a [[sensor]] of the rig file names their column", mapping_file));
 }
 
-std::string head(const TomlTable& mapping, const Recording& recording) {
+/// Keys of a run file's head, and the SI unit of those that are quantities; "text", or "number".
+constexpr std::pair<const char*, const char*> head_keys[] = {{"name", "text"}, {"kind", "text"}, {"medium", "text"}, {"density", "kg/m^3"}, {"speed", "m/s"}, {"calibration", "text"}, {"force_calibration", "text"},
+                                  {"density_std", "kg/m^3"}, {"density_std_percent", "number"}, {"density_error", "text"}, {"speed_std", "m/s"}, {"speed_std_percent", "number"}, {"speed_error", "text"},
+                                  {"calibration_std", "text"}, {"calibration_std_percent", "number"}, {"calibration_error", "text"}, {"force_calibration_std", "text"},
+                                  {"force_calibration_std_percent", "number"}, {"force_calibration_error", "text"}, {"clock_std_percent", "number"}, {"clock_error", "text"}};
+
+bool is_head_key(std::string_view name) {
+  return std::any_of(std::begin(head_keys), std::end(head_keys), [&](const auto& key) { return name == key.first; });
+}
+
+/// The run file's head: what the command line sets, else what [run] says.
+std::string head(const TomlTable& mapping, const Recording& recording, const std::vector<RunSetting>& settings) {
   std::string text = "# unrig_run = 1\n";
   text += fmt::format("# # imported from {} ({})\n", toml_string(recording.file), recording.format);
-  const TomlTable run = mapping.table("run");
-  const std::initializer_list<std::string_view> keys{"name", "kind", "medium", "density", "speed", "calibration", "force_calibration"};
-  run.allow_only(keys);
-  for (const std::string_view key : keys)
-    if (run.has(key)) text += fmt::format("# {} = {}\n", key, toml_string(run.text(key)));
+  const bool has_run = mapping.has("run") || settings.empty();
+  if (has_run)
+    for (const std::string& key : mapping.table("run").keys())
+      if (!is_head_key(key)) mapping.table("run").fail(key, fmt::format("the key \"run.{}\" is unknown", key), "wanted a key of a run file's head: name, kind, medium, density, speed, calibration, force_calibration, or what says how well these are known");
+  for (const auto& [name, unit] : head_keys) {
+    const std::string key = name;
+    const bool number = std::string_view(unit) == "number";
+    const auto set = std::find_if(settings.rbegin(), settings.rend(), [&](const RunSetting& s) { return s.key == key; });
+    if (set != settings.rend()) text += fmt::format("# {} = {}\n", key, number ? set->value : toml_string(set->value));
+    else if (has_run && mapping.table("run").has(key)) text += number ? fmt::format("# {} = {}\n", key, mapping.table("run").number(key)) : fmt::format("# {} = {}\n", key, toml_string(mapping.table("run").text(key)));
+  }
   return text;
 }
 
@@ -215,7 +234,33 @@ DelimitedFormat read_format(const TomlTable& mapping) {
 
 }  // namespace
 
-Imported import_recording(const Recording& recording, const std::string& mapping_text, const std::string& mapping_file) {
+RunSetting run_setting(const std::string& text) {
+  const InputError::Place place{"--set", 0};
+  const std::size_t equals = text.find('=');
+  RunSetting setting{text.substr(0, equals), equals == std::string::npos ? "" : text.substr(equals + 1)};
+  const auto key = std::find_if(std::begin(head_keys), std::end(head_keys), [&](const auto& one) { return setting.key == one.first; });
+  if (key == std::end(head_keys)) {
+    std::vector<std::string> names;
+    for (const auto& one : head_keys) names.emplace_back(one.first);
+    const std::string meant = nearest_word(setting.key, names);
+    throw InputError(place, fmt::format("\"{}\" sets no key of a run file's head", text), fmt::format("wanted KEY=VALUE, KEY one of: {}", fmt::join(names, ", ")), meant.empty() ? "" : "Did you mean " + meant + "?");
+  }
+  if (setting.value.empty()) throw InputError(place, fmt::format("\"{}\" gives {} no value", text, setting.key), "wanted KEY=VALUE", "");
+  const std::string_view unit = key->second;
+  double value = 0;
+  if (unit == "number") {
+    const char* const end = setting.value.data() + setting.value.size();
+    if (read_number(setting.value.data(), end, value) != end || !std::isfinite(value)) throw InputError(place, fmt::format("{} is \"{}\"", setting.key, setting.value), "wanted a number", "");
+  } else if (unit != "text") {
+    value = quantity(setting.value, unit, place, setting.key);
+    if (value < 0) throw InputError(place, fmt::format("{} is {} {}", setting.key, value, unit), "wanted zero or more", "");
+  } else if (setting.key == "kind" && setting.value != "step" && setting.value != "pluck" && setting.value != "forced" && setting.value != "moved") {
+    throw InputError(place, fmt::format("kind is \"{}\"", setting.value), "wanted step, pluck, forced or moved", "");
+  }
+  return setting;
+}
+
+Imported import_recording(const Recording& recording, const std::string& mapping_text, const std::string& mapping_file, const std::vector<RunSetting>& settings) {
   const TomlTable mapping = parse_mapping(mapping_text, mapping_file);
   Imported out;
   out.warnings = recording.warnings;
@@ -235,7 +280,7 @@ Imported import_recording(const Recording& recording, const std::string& mapping
   out.samples = columns[0].value.size();
   warn_of_names(mapping, mapping_file, columns, out.warnings);
 
-  out.text = head(mapping, recording);
+  out.text = head(mapping, recording, settings);
   for (std::size_t c = 0; c < columns.size(); ++c) out.text += fmt::format("{}{} [{}]", c == 0 ? "" : ",", columns[c].name, columns[c].unit);
   out.text += '\n';
   auto write = std::back_inserter(out.text);

@@ -27,6 +27,7 @@ namespace unrig {
 ///     [format]                    # of text, where it is not found out: delimiter, decimal, thousands, missing, skip_lines, header (core/import/delimited.h)
 ///
 /// Readings that a converter left unscaled are never taken for physical values: without `raw = true` they are an error.
+/// `settings` (of the command line) take the place of what [run] says.
 struct Imported {
   std::string text;                   ///< of the run file
   std::vector<std::string> warnings;
@@ -34,9 +35,16 @@ struct Imported {
   std::size_t samples = 0;
 };
 
+/// One key of a run file's head: "speed", "0.6 m/s".
+struct RunSetting {
+  std::string key, value;
+};
+/// "speed=0.6 m/s". Throws InputError, which names `--set`, where there is no such key of a head, and for a value without a unit or with a wrong one.
+RunSetting run_setting(const std::string& text);
+
 /// `mapping`: text of the mapping, `mapping_file` its name for messages. Throws InputError for a mapping that does not fit the recording, and for a result
 /// that read_run would refuse.
-Imported import_recording(const Recording& recording, const std::string& mapping, const std::string& mapping_file);
+Imported import_recording(const Recording& recording, const std::string& mapping, const std::string& mapping_file, const std::vector<RunSetting>& settings = {});
 
 /// Reads a file of a laboratory, its format told by its content. `mapping` as above, for the [format] of text.
 Recording read_recording(const std::string& path, const std::string& mapping, const std::string& mapping_file);

@@ -4,7 +4,6 @@
 
 #include <CLI/CLI.hpp>
 #include <cstdio>
-#include <filesystem>
 #include <string>
 #include <vector>
 
@@ -12,6 +11,7 @@
 #include "core/files/command_line.h"
 #include "core/files/error.h"
 #include "core/files/near_word.h"
+#include "core/files/questions.h"
 #include "core/files/text_file.h"
 #include "core/new/rig_templates.h"
 #include "core/new/run_template.h"
@@ -53,11 +53,6 @@ struct Asked {
   bool force = false;
 };
 
-void refuse_overwriting(const Asked& asked) {
-  if (asked.force || asked.output.starts_with("/dev/") || !std::filesystem::exists(asked.output)) return;
-  throw InputError({asked.output, 0}, "the file exists", "wanted a new name", "--force writes over it.");
-}
-
 void check_options(const Asked& asked) {
   const InputError::Place place{"unrig new " + asked.what, 0};
   if (asked.what == "rig" && asked.from.empty()) {
@@ -89,7 +84,7 @@ int new_command(int argc, char** argv) {
   if (asked.what != "rig" && asked.what != "run") throw InputError({"unrig new", 0}, fmt::format("\"{}\" is neither rig nor run", asked.what), "wanted `unrig new rig` or `unrig new run`", "");
   check_options(asked);
   check_outputs({{"-o", asked.output}}, {asked.rig});
-  refuse_overwriting(asked);
+  refuse_overwriting(asked.output, asked.force);
 
   const RunKind kind = asked.kind.empty() ? RunKind::step : kind_called(asked.kind);
   const std::string text = asked.what == "rig" ? rig_template(asked.from).text : run_template(kind, rig_of_run(asked.rig, kind));

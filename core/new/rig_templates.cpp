@@ -3,9 +3,6 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
-#include <algorithm>
-#include <sstream>
-
 #include "core/files/error.h"
 #include "core/files/near_word.h"
 
@@ -274,18 +271,6 @@ const RigTemplate& rig_template(const std::string& name) {
   }
   const std::string meant = nearest_word(name, names);
   throw InputError({"--from", 0}, fmt::format("there is no template \"{}\"", name), fmt::format("wanted one of: {}", fmt::join(names, ", ")), meant.empty() ? "" : "Did you mean " + meant + "?");
-}
-
-int questions_in(const std::string& text) {
-  std::istringstream lines(text);
-  int questions = 0;
-  bool within = false;  // several lines of one question
-  for (std::string line; std::getline(lines, line);) {
-    const bool asks = line.starts_with("# ?") || line.starts_with("# # ?");
-    questions += asks && !within;
-    within = asks;
-  }
-  return questions;
 }
 
 }  // namespace unrig

@@ -16,7 +16,4 @@ const std::vector<RigTemplate>& rig_templates();
 /// Throws InputError for a name that none has, with the one that was probably meant.
 const RigTemplate& rig_template(const std::string& name);
 
-/// How many lines of a template ask a question.
-int questions_in(const std::string& text);
-
 }  // namespace unrig

@@ -132,6 +132,27 @@ TEST(Documents, TheFiveMinutesOfTheReadmeComeOutAsPrinted) {
   }
 }
 
+/// As a newcomer types them: through the shell, from an empty folder, with `unrig` found by its name.
+TEST(Documents, TheTwentyMinutesComeOutAsPrinted) {
+  const TemporaryDirectory directory;
+  const WorkingDirectory there(directory.path(""));
+  const std::filesystem::path programs = directory.path("programs");
+  std::filesystem::create_directory(programs);
+  std::filesystem::create_symlink(std::filesystem::canonical(test::unrig_binary()), programs / "unrig");
+  int commands = 0;
+  for (const Shown& shown : shown_in(read_text(source_path("correct/manual/twenty_minutes.md")))) {
+    const std::string call = "export PATH='" + programs.string() + "':\"$PATH\"; { " + shown.command + "; } >.out 2>.err";
+    const int status = std::system(call.c_str());
+    ++commands;
+    EXPECT_EQ(status, 0) << shown.command << "\n" << read_text(".err");
+    const std::vector<std::string> printed = lines_of(read_text(".out"));
+    for (const std::string& line : shown.lines)
+      EXPECT_TRUE(std::any_of(printed.begin(), printed.end(), [&](const std::string& other) { return same_line(line, other); })) << shown.command << "\ndoes not print\n" << line << "\nbut\n" << read_text(".out");
+  }
+  EXPECT_EQ(commands, 13);
+  for (const char* made : {"rig.toml", "fit.json", "corrected.csv", "indicial.csv", "report.html"}) EXPECT_TRUE(std::filesystem::exists(made)) << made;
+}
+
 TEST(Documents, TheManualsLookAtARigComesOutAsPrinted) {
   const TemporaryDirectory directory;
   const std::vector<Shown> shown = shown_in(read_text(source_path("correct/manual/rig_files.md")));

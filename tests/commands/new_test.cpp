@@ -11,6 +11,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include "core/files/questions.h"
 #include "core/files/text_file.h"
 #include "core/new/rig_templates.h"
 #include "tests/commands/run_unrig.h"
