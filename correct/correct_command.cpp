@@ -11,6 +11,7 @@
 #include "core/files/provenance.h"
 #include "core/files/together.h"
 #include "correct/correct.h"
+#include "correct/correct_gate.h"
 #include "correct/corrected_files.h"
 #include "correct/modal/modal_load.h"
 #include "fit/givens/fitted_numbers.h"
@@ -33,14 +34,6 @@ void finish(const Result& result, const std::string& output, const TextFile& fur
 void warn_of_amplifier(const CorrectProblem& problem, std::vector<std::string>& warnings) {
   if (const std::string found = other_rig(problem.rig, problem.fit); !found.empty())
     warnings.push_back(fmt::format("{}: {}. That is right where the fitted recordings came through another amplifier than this one; otherwise fit again.", problem.rig.file, found));
-}
-
-/// The rig as stiff as it was fitted, for the check of a single run.
-Rig at_fitted_stiffness(const CorrectProblem& problem) {
-  Rig rig = problem.rig;
-  for (const auto& [name, chain] : {std::pair{"normal.stiffness_scale", &rig.normal}, std::pair{"torsion.stiffness_scale", &rig.torsion}})
-    if (const FittedParameter* scale = problem.fit.find(name, problem.run.file); scale && scale->value > 0) chain->flexibility /= scale->value;
-  return rig;
 }
 
 }  // namespace
@@ -74,7 +67,7 @@ int correct_command(int argc, char** argv) {
   progress("taking the rig out of " + run_path);
   if (problem.fit.rig_fingerprint.empty()) warn(fit_path + ": it does not say what the rig was: an earlier version wrote it. Whether it belongs to " + rig_path + " was not compared.");
   const MadeBy made_by{provenance_of(argc, argv, {"--indicial"}), fingerprint(problem.rig), fingerprint(problem.run, problem.rig), fingerprint(problem.fit)};
-  if (other_rig(problem.rig, problem.fit).empty()) pass_the_gate(at_fitted_stiffness(problem), {problem.run}, anyway);
+  pass_the_gate(problem, anyway);
   if (problem.rig.is_modal()) {
     if (imposed.any() || !indicial.empty())
       throw InputError({rig_path, 0}, "a rig known only as modes", "wanted a rig with a section for an indicial response", "Leave out --indicial, --monotone and --at-step.");

@@ -13,6 +13,7 @@
 #include "core/check/run_estimate.h"
 #include "core/check/waveform_gate.h"
 #include "core/files/error.h"
+#include "core/files/heard_warnings.h"
 #include "core/files/text_file.h"
 #include "core/run/run_limits.h"
 
@@ -316,7 +317,8 @@ std::vector<Suspicion> suspicions(const Rig& rig, const std::vector<Run>& runs) 
 }
 
 void tell(const std::vector<Suspicion>& suspicions) {
-  for (const Suspicion& s : suspicions) fmt::print(stderr, "check: {}\n", s.text);
+  for (const Suspicion& s : suspicions)
+    if (const std::string line = "check: " + s.text; !heard(line)) fmt::print(stderr, "{}\n", line);
 }
 
 void pass_the_gate(const Rig& rig, const std::vector<Run>& runs, bool anyway) {

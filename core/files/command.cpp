@@ -1,4 +1,5 @@
 #include "core/files/command.h"
+#include "core/files/heard_warnings.h"
 #include "core/files/last_progress.h"
 #include "core/files/verbosity.h"
 
@@ -58,7 +59,7 @@ void Progress::clear() {
 const std::string& last_progress() { return last_told; }
 
 void warn(const std::string& warning) {
-  if (verbosity == Verbosity::quiet) return;
+  if (heard(warning) || verbosity == Verbosity::quiet) return;
   static std::set<std::string> said;  // each once per call of the program
   if (!said.insert(warning).second) return;
   if (line_shown) erase_line();

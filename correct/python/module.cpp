@@ -6,23 +6,33 @@
 
 #include <algorithm>
 #include <array>
+#include <chrono>
 #include <cmath>
+#include <future>
 #include <map>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <optional>
+#include <thread>
 
+#include "core/check/gate.h"
 #include "core/files/error.h"
+#include "core/files/command.h"
+#include "core/files/heard_warnings.h"
+#include "core/rig/given_files.h"
 #include "core/rig/fingerprint.h"
 #include "core/numerics/in_parallel.h"
 #include "core/rig/rig.h"
 #include "core/run/run.h"
 #include "core/files/units.h"
 #include "correct/correct.h"
+#include "correct/correct_gate.h"
 #include "correct/corrected_files.h"
 #include "correct/modal/modal_load.h"
 #include "fit/apparent_mass/apparent_mass.h"
 #include "fit/apparent_mass/apparent_mass_files.h"
+#include "fit/check/check.h"
+#include "fit/check/implausible_parameters.h"
 #include "fit/diagnose/diagnose.h"
 #include "fit/diagnose/diagnosis_files.h"
 #include "fit/simulate/simulate_problem.h"
@@ -51,6 +61,68 @@ std::function<void(const std::string&)> told(const py::object& progress) {
     if (PyErr_CheckSignals() != 0) throw py::error_already_set();
     if (!callable->is_none()) (*callable)(what);
   };
+}
+
+/// What the program says on standard error becomes a Python warning each.
+void warn_in_python(const std::vector<std::string>& lines) {
+  for (const std::string& line : lines)
+    if (PyErr_WarnEx(PyExc_UserWarning, line.c_str(), 2) != 0) throw py::error_already_set();
+}
+
+/// `work` with what it says as Python warnings, also where it throws. Called with Python's lock, and works without it.
+template <class Work>
+auto with_warnings(const Work& work) {
+  HeardWarnings said;
+  std::optional<decltype(work())> result;
+  std::exception_ptr error;
+  {
+    const py::gil_scoped_release unlocked;
+    try {
+      result = work();
+    } catch (...) {
+      error = std::current_exception();
+    }
+  }
+  warn_in_python(said.lines());
+  if (error) std::rethrow_exception(error);
+  return std::move(*result);
+}
+
+/// What has no search that could be asked to stop, in a thread of its own: this one looks for an interrupt of the user's ten times a second and tells of the time that has gone.
+/// After an interrupt the thread goes on to its end with what it holds, and nobody hears of it.
+template <class Work>
+auto in_a_thread(Work work, const std::string& what, const py::object& progress) {
+  using Result = decltype(work());
+  struct Outcome {
+    std::optional<Result> result;
+    std::vector<std::string> said;
+    std::exception_ptr error;
+  };
+  const auto outcome = std::make_shared<Outcome>();
+  std::packaged_task<void()> task([outcome, work = std::move(work)] {
+    const HeardWarnings said;
+    try {
+      outcome->result = work();
+    } catch (...) {
+      outcome->error = std::current_exception();
+    }
+    outcome->said = said.lines();
+  });
+  std::future<void> done = task.get_future();
+  const auto doing = told(progress);
+  doing(what);
+  {
+    const py::gil_scoped_release unlocked;
+    std::thread(std::move(task)).detach();
+    for (int tenths = 1; done.wait_for(std::chrono::milliseconds(100)) != std::future_status::ready; ++tenths) {
+      const py::gil_scoped_acquire lock;
+      if (PyErr_CheckSignals() != 0) throw py::error_already_set();
+      if (tenths % 10 == 0) doing(what + " (" + std::to_string(tenths / 10) + " s gone)");
+    }
+  }
+  warn_in_python(outcome->said);
+  if (outcome->error) std::rethrow_exception(outcome->error);
+  return std::move(*outcome->result);
 }
 
 /// Times of a record that is sampled evenly.
@@ -96,9 +168,10 @@ Run run_of_arrays(const std::string& name, const std::string& kind, const Eigen:
 /// A fit, and the laws of its rig, which its file carries.
 struct FitWithLaws : FitResult {
   std::vector<std::shared_ptr<const Effect>> laws;
+  std::vector<std::string> implausible;  ///< parameters that no rig and no fluid has
 };
 
-FitWithLaws fit_of(const Rig& rig, const std::vector<Run>& runs, const std::vector<std::string>& effects, const std::vector<std::string>& laws, const StartValues& start, const std::vector<std::string>& profile, const py::object& progress) {
+FitWithLaws fit_of(const Rig& rig, const std::vector<Run>& runs, const std::vector<std::string>& effects, const std::vector<std::string>& laws, const StartValues& start, const std::vector<std::string>& profile, bool anyway, const py::object& progress) {
   FitProblem problem;
   problem.rig = rig;
   problem.runs = runs;
@@ -108,8 +181,16 @@ FitWithLaws fit_of(const Rig& rig, const std::vector<Run>& runs, const std::vect
   problem.start = start;
   problem.profile = profile;
   problem.progress = told(progress);
-  const py::gil_scoped_release unlocked;
-  return {fit(problem), problem.rig.laws};
+  return with_warnings([&] {
+    check_recorded_once(problem.runs, problem.rig);
+    pass_the_gate(problem.rig, problem.runs, anyway);
+    FitWithLaws result{fit(problem), problem.rig.laws, {}};
+    const std::vector<Suspicion> suspect = implausible_parameters(result);
+    tell(suspect);
+    if (!anyway)
+      for (const Suspicion& s : suspect) result.implausible.push_back(s.text);
+    return result;
+  });
 }
 
 py::dict load_of(const CorrectedLoad& load) {
@@ -117,23 +198,25 @@ py::dict load_of(const CorrectedLoad& load) {
   return py::dict("value"_a = load.value, "std"_a = load.std, "by_source"_a = load.by_source, "half_weight"_a = load.half_weight, "twice_weight"_a = load.twice_weight, "simultaneous"_a = load.simultaneous);
 }
 
-py::dict correction(const Rig& rig, const std::string& fit_json, const std::string& fit_name, const Run& run, double calibration, bool monotone, std::optional<double> at_step) {
+py::dict correction(const Rig& rig, const std::string& fit_json, const std::string& fit_name, const Run& run, double calibration, bool monotone, std::optional<double> at_step, bool anyway, const py::object& progress) {
   using namespace py::literals;
   const CorrectProblem problem{rig, read_fit(nlohmann::json::parse(fit_json), fit_name), run, calibration, {monotone, at_step}};
   if (rig.is_modal()) {
-    std::optional<ModalLoad> result;
-    {
-      const py::gil_scoped_release unlocked;
-      result = modal_load(problem);
-    }
+    std::optional<ModalLoad> result = in_a_thread(
+        [problem, anyway] {
+          pass_the_gate(problem, anyway);
+          return modal_load(problem);
+        },
+        "taking the rig out of " + run.file, progress);
     return py::dict("modal"_a = true, "unit"_a = result->unit, "start"_a = result->start, "dt"_a = result->dt, "gauge"_a = result->gauge, "load"_a = result->load, "std"_a = result->std,
                     "by_source"_a = result->by_source, "warnings"_a = result->warnings, "no_answer"_a = "", "report"_a = report(*result), "noise"_a = result->noise);
   }
-  std::optional<CorrectResult> result;
-  {
-    const py::gil_scoped_release unlocked;
-    result = correct(problem);
-  }
+  std::optional<CorrectResult> result = in_a_thread(
+      [problem, anyway] {
+        pass_the_gate(problem, anyway);
+        return correct(problem);
+      },
+      "taking the rig out of " + run.file, progress);
   const IndicialResponse& i = result->indicial;
   return py::dict("modal"_a = false, "unit"_a = "N", "start"_a = result->start, "dt"_a = result->dt, "onset"_a = result->onset, "semichords_per_second"_a = result->semichords_per_second,
                   "force_per_coefficient"_a = result->force_per_coefficient, "gauge"_a = result->gauge, "unexplained"_a = result->unexplained, "normal_force"_a = load_of(result->normal_force),
@@ -189,10 +272,11 @@ PYBIND11_MODULE(_unrig, m) {
 
   py::class_<FitWithLaws>(m, "Fit")
       .def_readonly("no_answer", &FitWithLaws::no_answer)
+      .def_readonly("implausible", &FitWithLaws::implausible)
       .def_property_readonly("json", [](const FitWithLaws& r) { return to_json(r, r.laws); })
       .def("report", [](const FitWithLaws& r, double least) { return report(r, least); }, "least"_a = 0.1);
-  m.def("fit", &fit_of, "rig"_a, "runs"_a, "effects"_a, "laws"_a, "start"_a, "profile"_a, "progress"_a);
-  m.def("correct", &correction, "rig"_a, "fit_json"_a, "fit_name"_a, "run"_a, "calibration"_a, "monotone"_a, "at_step"_a);
+  m.def("fit", &fit_of, "rig"_a, "runs"_a, "effects"_a, "laws"_a, "start"_a, "profile"_a, "anyway"_a, "progress"_a);
+  m.def("correct", &correction, "rig"_a, "fit_json"_a, "fit_name"_a, "run"_a, "calibration"_a, "monotone"_a, "at_step"_a, "anyway"_a, "progress"_a);
 
   m.def("apparent_mass", [](const Rig& rig, const Run& dry, const Run& wet, const py::object& progress) {
     ApparentMassProblem problem;
@@ -202,14 +286,20 @@ PYBIND11_MODULE(_unrig, m) {
     const ApparentMassResult result = apparent_mass(problem);
     return std::pair{to_json(result), report(result)};
   });
-  m.def("diagnose", [](const Rig& rig, const std::vector<Run>& runs, const std::vector<Run>& heldout, const std::vector<std::string>& effects, const py::object& progress) {
+  m.def("diagnose", [](const Rig& rig, const std::vector<Run>& runs, const std::vector<Run>& heldout, const std::vector<std::string>& effects, bool anyway, const py::object& progress) {
     DiagnoseProblem problem;
     problem.rig = rig, problem.runs = runs, problem.heldout = heldout;
     problem.effects = effects_of_option("effects", effects);
     problem.progress = told(progress);
-    const py::gil_scoped_release unlocked;
-    const Diagnosis result = diagnose(problem);
-    return std::pair{to_json(result), report(result)};
+    return with_warnings([&] {
+      std::vector<Run> all = problem.runs;
+      all.insert(all.end(), problem.heldout.begin(), problem.heldout.end());
+      check_recorded_once(all, problem.rig);
+      refuse_idle("effects", problem.effects, problem.rig, problem.runs);
+      pass_the_gate(problem.rig, all, anyway);
+      const Diagnosis result = diagnose(problem);
+      return std::pair{to_json(result), report(result)};
+    });
   });
   m.def("trial", [](const Rig& rig, const std::vector<Run>& recordings, const std::vector<std::string>& effects, int trials, unsigned seed, bool pairs, std::optional<double> noise, const py::object& progress) {
     TrialProblem problem;
@@ -220,14 +310,28 @@ PYBIND11_MODULE(_unrig, m) {
     const TrialResult result = run_trials(problem);
     return std::pair{to_json(result, {}, false), report(result)};
   });
-  m.def("simulate", [](const Rig& rig, const Run& run, const std::string& fit_json, const std::string& fit_name, const std::vector<std::string>& settings, const std::string& release_load, bool jumps, bool as_recorded) {
+  m.def("check", [](const Rig& rig, const std::vector<Run>& runs) {
+    return with_warnings([&] {
+      const Checked checked = check(rig, runs);
+      tell(checked.suspicions);
+      return std::pair{to_json(checked), report(checked)};
+    });
+  });
+  m.def("simulate", [](const Rig& rig, const Run& run, const std::string& fit_json, const std::string& fit_name, const std::vector<std::string>& settings, const std::string& release_load, bool jumps, bool as_recorded, const py::object& progress) {
     SimulateOptions options;
     options.rig = rig.file, options.run = run.file, options.fit = fit_name;
     options.settings = settings, options.release_load = release_load, options.jumps = jumps, options.as_recorded = as_recorded;
     std::optional<FittedRig> fit;
     if (!fit_json.empty()) fit = read_fit(nlohmann::json::parse(fit_json), fit_name);
-    const py::gil_scoped_release unlocked;
-    return simulate(simulate_problem(rig, run, fit, options, {}).problem).run;
+    return in_a_thread(
+        [rig, run, fit, options] {
+          for (const std::vector<std::string>* known : {&rig.warnings, &run.warnings})
+            for (const std::string& warning : *known) warn(warning);
+          const SimulateResult result = simulate(simulate_problem(rig, run, fit, options, {}).problem);
+          for (const std::string& warning : result.warnings) warn(warning);
+          return result.run;
+        },
+        "simulating " + run.file, progress);
   });
   m.def("use_threads", &use_threads, "threads"_a, "How many threads the library may work in.");
 }

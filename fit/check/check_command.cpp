@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
-#include <algorithm>
 #include <string>
 #include <vector>
 
@@ -11,33 +10,9 @@
 #include "core/files/command_line.h"
 #include "core/files/text_file.h"
 #include "core/rig/given_files.h"
-#include "fit/check/check_files.h"
+#include "fit/check/check.h"
 
 namespace unrig {
-namespace {
-
-bool any_grave(const std::vector<Suspicion>& suspicions) {
-  return std::any_of(suspicions.begin(), suspicions.end(), [](const Suspicion& s) { return s.grave; });
-}
-
-/// What the runs could determine; of input that cannot be right, or that a fit refuses, why nothing is said.
-void foresee(const Rig& rig, const std::vector<Run>& runs, Checked& checked) {
-  if (runs.empty()) return;
-  if (any_grave(checked.suspicions)) {
-    checked.not_foreseen = "not looked at, since the input cannot be right";
-    return;
-  }
-  try {
-    checked.foreseen = foresee(rig, runs);
-  } catch (const InputError& e) {
-    checked.not_foreseen = e.what();
-  } catch (const NoAnswer& e) {
-    checked.not_foreseen = e.what();
-  }
-}
-
-}  // namespace
-
 int check_command(int argc, char** argv) {
   CLI::App app{"Are rig file and recordings plausible, and what can they determine? A rig alone: its modes, masses and loads.", "unrig check"};
   std::string rig_path, output;
@@ -64,13 +39,8 @@ int check_command(int argc, char** argv) {
   for (const Run& run : runs)
     for (const std::string& warning : run.warnings) warn(warning);
 
-  Checked checked;
-  checked.rig_file = rig_path;
+  Checked checked = check(rig, runs);
   checked.made = provenance_of(argc, argv);
-  checked.rig = summary_of(rig, runs);
-  for (const Run& run : runs) checked.runs.push_back(summary_of(rig, run));
-  checked.suspicions = suspicions(rig, runs);
-  foresee(rig, runs, checked);
 
   tell(checked.suspicions);
   if (!output.empty()) write_text(output, to_json(checked));

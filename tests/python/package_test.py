@@ -1,4 +1,5 @@
 """The Python package against the program: python3 package_test.py UNRIG SAMPLE_CAMPAIGN, with the package on PYTHONPATH. Prints one line; fails by an assertion."""
+import _thread
 import ast
 import importlib.util
 import json
@@ -6,6 +7,8 @@ import pathlib
 import subprocess
 import sys
 import tempfile
+import time
+import warnings
 
 try:
     import numpy as np
@@ -71,6 +74,53 @@ with tempfile.TemporaryDirectory() as folder:
         raise AssertionError("a parameter that is not there")
     except unrig.InputError as error:
         assert "wanted one of" in str(error)
+
+    # The gate: what the program says and refuses, in its words; `anyway` goes on with the program's numbers.
+    pounds = folder / "pounds.csv"
+    pounds.write_text((campaign / "step_b.csv").read_text().replace("gauge [N]", "gauge [lbf]"))
+    suspect = [*runs, str(pounds)]
+    refused = subprocess.run([program, "fit", "--rig", rig, *suspect, "-o", folder / "no.json"], capture_output=True, text=True)
+    assert refused.returncode == 1
+    for call in (lambda: unrig.fit(rig, suspect), lambda: unrig.diagnose(rig, suspect)):
+        with warnings.catch_warnings(record=True) as said:
+            warnings.simplefilter("always")
+            try:
+                call()
+                raise AssertionError("a gauge in the wrong unit")
+            except unrig.NoAnswer as error:
+                assert str(error) in refused.stderr and "anyway" in str(error), error
+        checks = [str(w.message) for w in said if str(w.message).startswith("check: ")]
+        assert checks and all(line in refused.stderr.splitlines() for line in checks), checks
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        checked, forced = unrig.check(rig, suspect), unrig.fit(rig, suspect, anyway=True)
+        subprocess.run([program, "check", "--rig", rig, *suspect, "-o", folder / "check.json", "--quiet"], check=False, capture_output=True)
+        subprocess.run([program, "fit", "--rig", rig, *suspect, "--anyway", "-o", folder / "anyway.json", "--quiet"], check=False, capture_output=True)
+    written = json.loads((folder / "check.json").read_text())
+    assert not checked.trustworthy and {key: checked.data[key] for key in ("rig", "runs", "suspicions", "determined")} == {key: written[key] for key in ("rig", "runs", "suspicions", "determined")}
+    assert forced.data["parameters"] == json.loads((folder / "anyway.json").read_text())["parameters"]
+    assert unrig.check(rig, runs).trustworthy
+
+    # Warnings of `simulate` and `correct` are Python's, progress is told, and an interrupt ends them.
+    for call in (lambda tell: unrig.simulate(rig, runs[2], progress=tell), lambda tell: unrig.correct(rig, result, runs[2], progress=tell)):
+        told = []
+        with warnings.catch_warnings(record=True) as said:
+            warnings.simplefilter("always")
+            call(told.append)
+        assert told and "step_a.csv" in told[0], told
+    with warnings.catch_warnings(record=True) as said:
+        warnings.simplefilter("always")
+        unrig.simulate(rig, runs[2])
+    assert any("the angle is a measurement" in str(w.message) for w in said), [str(w.message) for w in said]
+
+    def interrupt(what):
+        _thread.interrupt_main()
+    try:
+        unrig.correct(rig, result, runs[2], progress=interrupt)
+        time.sleep(1)
+        raise AssertionError("an interrupt that was not obeyed")
+    except KeyboardInterrupt:
+        pass
 
     # A fit's parameters as a data set.
     table = result.to_dataset()

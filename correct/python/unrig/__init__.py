@@ -13,8 +13,8 @@ Everything is in SI units and radians. What cannot be used raises `InputError` (
 """
 from ._unrig import InputError, NoAnswer, Rig, Run, __version__, use_threads
 from .inputs import read_rig, read_run, run_from_arrays, run_from_dataframe
-from .results import ApparentMassResult, Diagnosis, FitResult, Parameter, TrialResult
-from .verbs import apparent_mass, correct, diagnose, fit, simulate, trial
+from .results import ApparentMassResult, Checked, Diagnosis, FitResult, Parameter, TrialResult
+from .verbs import apparent_mass, check, correct, diagnose, fit, simulate, trial
 
-__all__ = ["ApparentMassResult", "Diagnosis", "FitResult", "InputError", "NoAnswer", "Parameter", "Rig", "Run", "TrialResult", "__version__", "apparent_mass", "correct", "diagnose", "fit",
+__all__ = ["ApparentMassResult", "Checked", "Diagnosis", "FitResult", "InputError", "NoAnswer", "Parameter", "Rig", "Run", "TrialResult", "__version__", "apparent_mass", "check", "correct", "diagnose", "fit",
            "read_rig", "read_run", "run_from_arrays", "run_from_dataframe", "simulate", "trial", "use_threads"]

@@ -86,7 +86,8 @@ class FitResult(Result):
         parameters = [Parameter(p["name"], number(p["value"]), number(p["std_error"]), p["unit"], p.get("run", ""), number(p["start"]), p["identified"], p.get("advice", "")) for p in self.data["parameters"]]
         self.params = Parameters({label(p): p for p in parameters})
 
-    success = property(lambda self: bool(self.data["converged"]) and not self.no_answer, doc="The search converged, and its answer is to be trusted.")
+    implausible = property(lambda self: self._compiled.implausible, doc="Parameters that no rig and no fluid has, in words; empty with `anyway`.")
+    success = property(lambda self: bool(self.data["converged"]) and not self.no_answer and not self.implausible, doc="The search converged, and its answer is to be trusted.")
     no_answer = property(lambda self: self.data.get("no_answer", ""), doc="Why the numbers are not to be trusted; empty: they are.")
     message = property(lambda self: self.data["message"])
     chisqr = property(lambda self: number(self.data["chi2"]))
@@ -156,6 +157,12 @@ class Diagnosis(Result):
     missing = property(lambda self: [m["effect"] for m in self.data["missing"]], doc="Ids of the effects that were named.")
     unexplained = property(lambda self: bool(self.data["unexplained"]))
     equivalent = property(lambda self: self.data["equivalent"])
+
+
+class Checked(Result):
+    """What `check` found."""
+    suspicions = property(lambda self: self.data["suspicions"], doc="What cannot be right, or was left out.")
+    trustworthy = property(lambda self: not any(s["grave"] for s in self.suspicions), doc="No suspicion is grave.")
 
 
 class ApparentMassResult(Result):

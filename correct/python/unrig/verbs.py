@@ -9,20 +9,21 @@ import numpy as np
 from . import _unrig
 from ._unrig import Rig, Run
 from .inputs import Path, as_rig, as_run
-from .results import ApparentMassResult, Diagnosis, FitResult, TrialResult
+from .results import ApparentMassResult, Checked, Diagnosis, FitResult, TrialResult
 
 Progress = Optional[Callable[[str], None]]
 SOURCES = ["gauge", "angle", "calibration", "rig", "regularisation"]
 
 
 def fit(rig: Union[Path, Rig], runs: Iterable[Union[Path, Run]], effects: Sequence[str] = (), laws: Sequence[Path] = (), *, start: Mapping[str, float] = {}, profile: Sequence[str] = (),
-        progress: Progress = None) -> FitResult:
+        anyway: bool = False, progress: Progress = None) -> FitResult:
     """Stiffness, damping, apparent mass and lift slope from all runs together, as `unrig fit`.
 
     effects: ids of physics beyond the rig model that is at work. laws: files with laws of your own. start: start values in SI by parameter name.
     profile: parameters to give profile-likelihood intervals of, or ["all"]. progress: called with what is being done.
+    anyway: go on although the check finds that the input cannot be right; without it that raises NoAnswer.
     """
-    return FitResult(_unrig.fit(as_rig(rig), [as_run(run) for run in runs], list(effects), [str(law) for law in laws], dict(start), list(profile), progress))
+    return FitResult(_unrig.fit(as_rig(rig), [as_run(run) for run in runs], list(effects), [str(law) for law in laws], dict(start), list(profile), anyway, progress))
 
 
 def text_of_fit(result: Union[Path, FitResult]) -> tuple[str, str]:
@@ -35,7 +36,7 @@ def text_of_fit(result: Union[Path, FitResult]) -> tuple[str, str]:
 
 
 def simulate(rig: Union[Path, Rig], run: Union[Path, Run], *, result: Union[Path, FitResult, None] = None, settings: Mapping[str, float] = {}, release_load: Optional[float] = None, jumps: bool = False,
-             as_recorded: bool = False) -> Run:
+             as_recorded: bool = False, progress: Progress = None) -> Run:
     """What gauge and sensors read in a motion, as `unrig simulate`: a run with its columns in SI.
 
     result: a fit, or the path of its fit.json. settings: values of model parameters in SI, by name.
@@ -44,10 +45,11 @@ def simulate(rig: Union[Path, Rig], run: Union[Path, Run], *, result: Union[Path
     """
     text, name = ("", "") if result is None else text_of_fit(result)
     load = "" if release_load is None else f"{float(release_load)!r} N"
-    return _unrig.simulate(as_rig(rig), as_run(run), text, name, [f"{key}={float(value)!r}" for key, value in settings.items()], load, jumps, as_recorded)
+    return _unrig.simulate(as_rig(rig), as_run(run), text, name, [f"{key}={float(value)!r}" for key, value in settings.items()], load, jumps, as_recorded, progress)
 
 
-def correct(rig: Union[Path, Rig], result: Union[Path, FitResult], run: Union[Path, Run], *, calibration_error: float = 0.0, monotone: bool = False, at_step: Optional[float] = None):
+def correct(rig: Union[Path, Rig], result: Union[Path, FitResult], run: Union[Path, Run], *, calibration_error: float = 0.0, monotone: bool = False, at_step: Optional[float] = None, anyway: bool = False,
+            progress: Progress = None):
     """The load of a rigid rig out of a gauge record, as `unrig correct`: an xarray.Dataset.
 
     result: a fit, or the path of its fit.json. calibration_error: relative standard deviation of the gauge's calibration.
@@ -57,7 +59,7 @@ def correct(rig: Union[Path, Rig], result: Union[Path, FitResult], run: Union[Pa
     import xarray
     rig, run = as_rig(rig), as_run(run)
     text, name = text_of_fit(result)
-    r = _unrig.correct(rig, text, name, run, calibration_error, monotone, at_step)
+    r = _unrig.correct(rig, text, name, run, calibration_error, monotone, at_step, anyway, progress)
     time = r["start"] + r["dt"] * np.arange(len(r["gauge"]))
     attrs = {"rig": rig.file, "run": run.file, "fit": name, "unrig_version": _unrig.__version__, "run_fingerprint": run.fingerprint, "no_answer": r["no_answer"], "warnings": "\n".join(r["warnings"]),
              "noise": r["noise"]}
@@ -96,9 +98,15 @@ def correct(rig: Union[Path, Rig], result: Union[Path, FitResult], run: Union[Pa
     return xarray.Dataset(variables, coords, attrs)
 
 
-def diagnose(rig: Union[Path, Rig], runs: Iterable[Union[Path, Run]], *, heldout: Iterable[Union[Path, Run]] = (), effects: Sequence[str] = (), progress: Progress = None) -> Diagnosis:
-    """Which known physical effect is missing from the model, as `unrig diagnose`. effects: the candidates; none: all that can act."""
-    return Diagnosis(*_unrig.diagnose(as_rig(rig), [as_run(run) for run in runs], [as_run(run) for run in heldout], list(effects), progress))
+def diagnose(rig: Union[Path, Rig], runs: Iterable[Union[Path, Run]], *, heldout: Iterable[Union[Path, Run]] = (), effects: Sequence[str] = (), anyway: bool = False,
+             progress: Progress = None) -> Diagnosis:
+    """Which known physical effect is missing from the model, as `unrig diagnose`. effects: the candidates; none: all that can act. anyway: as of `fit`."""
+    return Diagnosis(*_unrig.diagnose(as_rig(rig), [as_run(run) for run in runs], [as_run(run) for run in heldout], list(effects), anyway, progress))
+
+
+def check(rig: Union[Path, Rig], runs: Iterable[Union[Path, Run]] = ()) -> Checked:
+    """Are rig and runs plausible, and what can they determine, as `unrig check`. Suspicions are warnings too."""
+    return Checked(*_unrig.check(as_rig(rig), [as_run(run) for run in runs]))
 
 
 def apparent_mass(rig: Union[Path, Rig], dry: Union[Path, Run], wet: Union[Path, Run], *, progress: Progress = None) -> ApparentMassResult:

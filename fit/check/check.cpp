@@ -1,0 +1,42 @@
+#include "fit/check/check.h"
+
+#include <algorithm>
+
+#include "core/files/error.h"
+
+namespace unrig {
+namespace {
+
+/// What the runs could determine; of input that cannot be right, or that a fit refuses, why nothing is said.
+void foresee(const Rig& rig, const std::vector<Run>& runs, Checked& checked) {
+  if (runs.empty()) return;
+  if (any_grave(checked.suspicions)) {
+    checked.not_foreseen = "not looked at, since the input cannot be right";
+    return;
+  }
+  try {
+    checked.foreseen = foresee(rig, runs);
+  } catch (const InputError& e) {
+    checked.not_foreseen = e.what();
+  } catch (const NoAnswer& e) {
+    checked.not_foreseen = e.what();
+  }
+}
+
+}  // namespace
+
+bool any_grave(const std::vector<Suspicion>& suspicions) {
+  return std::any_of(suspicions.begin(), suspicions.end(), [](const Suspicion& s) { return s.grave; });
+}
+
+Checked check(const Rig& rig, const std::vector<Run>& runs) {
+  Checked checked;
+  checked.rig_file = rig.file;
+  checked.rig = summary_of(rig, runs);
+  for (const Run& run : runs) checked.runs.push_back(summary_of(rig, run));
+  checked.suspicions = suspicions(rig, runs);
+  foresee(rig, runs, checked);
+  return checked;
+}
+
+}  // namespace unrig
