@@ -11,7 +11,7 @@ packages="cmake g++ make ninja-build pkg-config
   libeigen3-dev libceres-dev libfftw3-dev libudunits2-dev libtomlplusplus-dev nlohmann-json3-dev libcli11-dev libfmt-dev libfast-float-dev libhdf5-dev zlib1g-dev libjs-dygraphs
   libmatio-dev libgtest-dev libgmock-dev libbenchmark-dev"
 optional="ccache clang libclang-rt-dev chromium python3-numpy python3-scipy python3-h5py
-  pybind11-dev python3-dev python3-xarray python3-pandas python3-netcdf4 python3-matplotlib zsh fish"
+  pybind11-dev python3-dev python3-xarray python3-pandas python3-netcdf4 python3-matplotlib zsh fish openmpi-bin slurm-wlm snakemake"
 
 case "${1-}" in
   "") ;;
