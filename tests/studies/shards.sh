@@ -12,7 +12,7 @@ trap 'rm -rf "$folder"' EXIT
 trap 'exit 1' HUP INT TERM
 cd "$folder"
 null="$sources/sample_data/campaigns/null"
-study() { exec "$unrig" trial --rig "$null/rig.toml" "$null/dry_pluck.csv" --nulls --effects mains-hum,tank-wave --trials "$trials" --seed 30 --threads 1 --quiet "$@"; }
+study() { exec "$unrig" trial --rig "$null/rig.toml" "$null/dry_pluck.csv" --nulls --effects mains-hum --trials "$trials" --seed 30 --threads 1 --quiet "$@"; }
 now() { date +%s.%N; }
 calculate() { awk "BEGIN { printf \"%.$2f\", $1 }"; }
 draw() { od -An -N4 -tu4 /dev/urandom | awk "{ printf \"%.3f\", \$1 / 4294967296 * $1 }"; }  # from 0 to $1
