@@ -2,7 +2,10 @@
 #include <gtest/gtest.h>
 #include <signal.h>
 
+#include <algorithm>
 #include <chrono>
+#include <cstdio>
+#include <cstdlib>
 #include <filesystem>
 #include <fstream>
 #include <map>
@@ -137,7 +140,7 @@ commands = ["apparent-mass", "correct", "check", "diagnose"]
   const json fit = json::parse(text("fit.json")), apparent = json::parse(text("apparent.json"));
   for (const json& parameter : fit.at("parameters")) {
     const std::string name = parameter.at("name"), unit = parameter.at("unit"), heading = "fit." + name + (unit == "1" ? "" : " [" + unit + "]");
-    const std::string row = parameter.contains("run") ? fs::relative(parameter.at("run").get<std::string>(), path("")).string() : "null/heldout.csv";
+    const std::string row = parameter.contains("run") ? fs::path(parameter.at("run").get<std::string>()).lexically_relative(path("")).string() : "null/heldout.csv";
     EXPECT_EQ(std::stod(table.at(row, heading)), parameter.at("value").get<double>()) << name;
   }
   EXPECT_EQ(std::stod(table.at("null/step_b.csv", "fit.rms_residual [N]")), fit.at("runs").at(3).at("rms_residual").get<double>());
@@ -163,7 +166,8 @@ TEST_F(BatchCommand, AFailureIsARowWithItsMessage) {
   EXPECT_EQ(table.at("c0001/decay.csv", "status"), "unusable");
   EXPECT_THAT(table.at("c0001/decay.csv", "message"), HasSubstr("c0001/decay.csv:8: "));
   EXPECT_EQ(table.at("c0002/<b>&.csv", "fit"), "unusable");
-  EXPECT_THAT(text("table.html"), Not(HasSubstr("<b>"))) << "what comes from files is text in the page";
+  EXPECT_THAT(text("table.html"), HasSubstr("c0002/\\u003cb>&.csv"));
+  EXPECT_THAT(text("table.html"), Not(HasSubstr("<b>&.csv"))) << "what comes from files is text in the page";
   // Nothing done at all.
   fs::remove_all(path("c0000"));
   const test::Finished finished = batch("other.csv");
@@ -208,10 +212,10 @@ TEST_F(BatchCommand, ShardsGiveTheSameBytes) {
 TEST_F(BatchCommand, ALongCampaignIsCutToo) {
   fs::create_directory_symlink(test::source_path("sample_data/campaigns/null"), path("null"));
   for (int i = 0; i < 20; ++i) fs::copy_file(test::null_campaign("step_c.csv"), path(fmt::format("further_{:02}.csv", i)));
-  for (int i = 0; i < 20; ++i) std::ofstream(path(fmt::format("further_{:02}.csv", i)), std::ios::app) << "";
   write("campaigns.toml", "unrig_batch = 1\n[[campaign]]\nname = \"null\"\nrig = \"null/rig.toml\"\nruns = [\"null/dry_pluck.csv\", \"null/step_a.csv\"]\nfurther = [\"further_*.csv\"]\ncommands = [\"correct\"]\n");
   done("table.csv");
-  const json whole = json::parse([&] { done("all.json"); return text("all.json"); }());
+  done("all.json");
+  const json whole = json::parse(text("all.json"));
   done("part1.json", {"--shard", "1/2"});
   done("part2.json", {"--shard", "2/2"});
   EXPECT_EQ(json::parse(text("part1.json")).at("cases").size(), 17u) << "the fit and sixteen corrections";
