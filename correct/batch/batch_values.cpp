@@ -55,6 +55,7 @@ void take_fit(BatchCase& one, const ordered_json& fit, const Strings& files) {
     if (!parameter.at("identified").get<bool>()) estimate["value"] = estimate["std_error"] = nullptr;  // held at its start: the runs say nothing of it
     take_estimate(*values, parameter.at("name"), parameter.at("unit"), estimate);
   }
+  for (const ordered_json& known : at(fit, "determined")) take_estimate(one.values, known.at("combination"), "", known);  // what is known where a parameter is not, in SI
 }
 
 void take_apparent_mass(BatchCase& one, const ordered_json& apparent) {

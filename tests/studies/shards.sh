@@ -29,11 +29,12 @@ for shards in $numbers; do
   while [ $shard -le "$shards" ]; do
     left=$((kills - killed))
     here=$(((left + shards - shard) / (shards - shard + 1)))
+    long=$(calculate "$one / $shards / ($here + 1)" 3)  # what one process has left, roughly, so that most are killed before they are done
     while [ $here -gt 0 ]; do
       here=$((here - 1)) tries=$((tries + 1))
       study --cases "of_$shards/cases" --shard $shard/"$shards" -o "of_$shards/part$shard.json" &
       process=$!
-      sleep "$(draw "$(calculate "$one / $shards" 3)")"
+      sleep "$(draw "$long")"
       kill -9 $process 2> /dev/null || true
       status=0
       wait $process 2> /dev/null || status=$?
