@@ -3,27 +3,25 @@
 
 #include <algorithm>
 #include <cstdio>
-#include <exception>
 #include <filesystem>
 #include <iterator>
-#include <new>
 #include <string>
 #include <system_error>
 #include <vector>
 
 #include "core/files/command.h"
-#include "core/files/error.h"
-#include "core/import/import_command.h"
-#include "core/new/new_command.h"
-#include "core/files/last_progress.h"
 #include "core/files/near_word.h"
+#include "core/files/run_command.h"
 #include "core/files/text_file.h"
 #include "core/files/verbosity.h"
+#include "core/import/import_command.h"
+#include "core/new/new_command.h"
+#include "correct/batch/batch_command.h"
+#include "correct/batch/collect_command.h"
 #include "correct/correct_command.h"
 #include "correct/report/report_command.h"
 #include "fit/apparent_mass/apparent_mass_command.h"
 #include "fit/check/check_command.h"
-#include "fit/trial/collect_command.h"
 #include "fit/diagnose/diagnose_command.h"
 #include "fit/trial/trial_command.h"
 #include "fit/fit_command.h"
@@ -40,8 +38,9 @@ constexpr unrig::Command commands[] = {
     {"apparent-mass", "apparent mass of the fluid from the frequencies of a dry and a wet free decay", unrig::apparent_mass_command},
     {"diagnose", "where recordings and model differ, and which physics was left out", unrig::diagnose_command},
     {"trial", "how often diagnose finds what was hidden in simulated campaigns", unrig::trial_command},
-    {"collect", "put the shards of a trial together", unrig::collect_command},
     {"correct", "take the rig out of a gauge record: rigid-rig load and indicial response", unrig::correct_command},
+    {"batch", "check, fit, correct and diagnose many campaigns: one table with a row for each run", unrig::batch_command},
+    {"collect", "put the shards of a trial or a batch together", unrig::collect_command},
     {"report", "show results as one HTML file: traces, residuals, spectra, parameters", unrig::report_command},
 };
 
@@ -78,34 +77,6 @@ The manual, with every key, column and verdict: correct/manual (once installed: 
 )", stream);
 }
 
-/// An exception that no command foresees: what was being done, with which files, and where to turn.
-int tell_of_a_fault(const unrig::Command& command, int argc, char** argv, const std::string& what) {
-  const std::string& doing = unrig::last_progress();
-  std::fprintf(stderr, "unrig %s: stopped%s: %s.\nNo file should lead to this: it is a fault of unrig %s. Please report it to whoever you have unrig from, with the files of this call:\n  unrig", command.name,
-               doing.empty() ? "" : (" while " + doing).c_str(), what.c_str(), UNRIG_VERSION);
-  for (int i = 0; i < argc; ++i) std::fprintf(stderr, " %s", argv[i]);
-  std::fputs("\n", stderr);
-  return unrig::exit_no_answer;
-}
-
-int run(const unrig::Command& command, int argc, char** argv) {
-  try {
-    return command.run(argc, argv);
-  } catch (const unrig::InputError& e) {
-    std::fprintf(stderr, "unrig %s: %s\n", command.name, e.what());
-    return unrig::exit_wrong_use;
-  } catch (const unrig::NoAnswer& e) {
-    std::fprintf(stderr, "unrig %s: %s\n", command.name, e.what());
-    return unrig::exit_no_answer;
-  } catch (const std::bad_alloc&) {
-    const std::string& doing = unrig::last_progress();
-    std::fprintf(stderr, "unrig %s: the memory of this machine is not enough%s\n", command.name, doing.empty() ? "" : (" while " + doing).c_str());
-    return unrig::exit_no_answer;
-  } catch (const std::exception& e) {
-    return tell_of_a_fault(command, argc, argv, e.what());
-  }
-}
-
 /// Runs a command without the options that are every command's: what of them is asked for is done here.
 int run_as_told(const unrig::Command& command, int argc, char** argv) {
   bool quiet = false, as_json = false;
@@ -128,7 +99,7 @@ int run_as_told(const unrig::Command& command, int argc, char** argv) {
   }
   const auto count = static_cast<int>(words.size());
   words.push_back(nullptr);
-  if (!quiet && !as_json) return run(command, count, words.data());
+  if (!quiet && !as_json) return run_command(command, count, words.data());
   const auto written = [&] {
     std::error_code none;
     return std::filesystem::last_write_time(output, none);
@@ -138,7 +109,7 @@ int run_as_told(const unrig::Command& command, int argc, char** argv) {
   const int out = dup(STDOUT_FILENO), nowhere = open("/dev/null", O_WRONLY);
   dup2(nowhere, STDOUT_FILENO);
   close(nowhere);
-  const int status = run(command, count, words.data());
+  const int status = run_command(command, count, words.data());
   std::fflush(stdout);
   dup2(out, STDOUT_FILENO);
   close(out);
@@ -172,7 +143,7 @@ int help(int argc, char** argv) {
   if (!command) return no_such_command(argv[2]);
   std::string option = "--help";
   char* words[] = {argv[2], option.data(), nullptr};
-  return run(*command, 2, words);
+  return run_command(*command, 2, words);
 }
 
 }  // namespace

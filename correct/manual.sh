@@ -18,9 +18,10 @@ run.csv     one recording: meta data in lines that begin with "# ", a row of nam
 rig.toml    one structure: section, elements with mass and flexibility, gauge; or its modes
 fit.json, apparent.json, diagnosis.json, trial.json, check.json     results
 corrected.csv, indicial.csv, simulated.csv                          results in columns
+campaigns.toml, table.csv                                           many campaigns for batch, and its table
 law.toml    a law of one's own
 FILES
-printf 'Their formats: share/doc/unrig/manual/run_files.md, rig_files.md, laws.md, results.md.\n'
+printf 'Their formats: share/doc/unrig/manual/run_files.md, rig_files.md, laws.md, results.md, batch.md.\n'
 printf '.SH EXIT STATUS\n'
 verbatim << 'STATUS'
 0    done; warnings, if there are any, on standard error
@@ -38,5 +39,6 @@ unrig fit --rig rig.toml dry_pluck.csv wet_pluck.csv step_a.csv -o fit.json
 unrig correct --rig rig.toml --fit fit.json step_a.csv -o corrected.csv --indicial indicial.csv
 unrig diagnose --rig rig.toml dry_pluck.csv wet_pluck.csv step_a.csv -o diagnosis.json
 unrig report fit.json corrected.csv -o report.html
+unrig batch campaigns.toml -o table.csv
 EXAMPLES
 printf '.SH SEE ALSO\nshare/doc/unrig/manual: run files, rig files, results and verdicts, effects, method, library.\n'

@@ -12,6 +12,7 @@
 #include "core/rig/given_files.h"
 #include "core/files/provenance.h"
 #include "core/files/text_file.h"
+#include "correct/batch/batch_files.h"
 #include "correct/report/result_files.h"
 #include "fit/simulate/simulated_run.h"
 
@@ -20,7 +21,7 @@ namespace {
 
 using nlohmann::json;
 
-constexpr const char* wanted = "wanted what `unrig fit`, `apparent-mass`, `diagnose`, `trial`, `correct` or `simulate` wrote with -o or --indicial";
+constexpr const char* wanted = "wanted what `unrig fit`, `apparent-mass`, `diagnose`, `trial`, `batch`, `correct` or `simulate` wrote with -o or --indicial";
 
 void add_json(ReportPage& page, const std::string& text, const std::string& path, const ReportOptions& options) {
   const json result = json::parse(text, nullptr, false);
@@ -31,6 +32,7 @@ void add_json(ReportPage& page, const std::string& text, const std::string& path
     if (kind == "apparent-mass") return add_apparent_mass(page, result, path, options);
     if (kind == "diagnosis") return add_diagnosis(page, result, path, options);
     if (kind == "trial") return add_trial(page, result, path);
+    if (kind == "batch") return add_batch(page, batch_result(nlohmann::ordered_json::parse(text), path), file_name(path));
   } catch (const json::exception& e) {
     throw InputError({path, 0}, e.what(), wanted, "");
   }
@@ -86,7 +88,7 @@ int report_command(int argc, char** argv) {
   std::vector<std::string> results;
   std::string output, title;
   ReportOptions options;
-  app.add_option("results", results, "fit.json, apparent.json, diagnosis.json, trial.json, corrected.csv, indicial.csv, simulated.csv, in any number and order")->required();
+  app.add_option("results", results, "fit.json, apparent.json, diagnosis.json, trial.json, batch.json, corrected.csv, indicial.csv, simulated.csv, in any number and order")->required();
   app.add_option("-o,--output", output, "report (HTML)")->required();
   app.add_option("--data", options.data_folder, "folder of the recordings and the rig, where they are no longer at the paths that the results name");
   app.add_option("--title", title, "title of the page, in place of the files' names");

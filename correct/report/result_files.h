@@ -10,6 +10,8 @@
 
 namespace unrig {
 
+struct BatchResult;
+
 /// What the report is told besides the results.
 struct ReportOptions {
   std::string data_folder;  ///< where recordings and rigs are looked for first; empty: where the results say
@@ -45,6 +47,8 @@ void add_fit(ReportPage& page, const nlohmann::json& result, const std::string& 
 void add_apparent_mass(ReportPage& page, const nlohmann::json& result, const std::string& path, const ReportOptions& options);
 void add_diagnosis(ReportPage& page, const nlohmann::json& result, const std::string& path, const ReportOptions& options);
 void add_trial(ReportPage& page, const nlohmann::json& result, const std::string& path);
+/// A table with a row for each run of a batch, called `name`.
+void add_batch(ReportPage& page, const BatchResult& result, const std::string& name);
 /// A run that `unrig simulate` wrote, beside the recording that it was simulated from where that is found.
 void add_simulated(ReportPage& page, const std::string& text, const std::string& path, const ReportOptions& options);
 void add_corrected(ReportPage& page, const std::string& text, const std::string& path);

@@ -49,7 +49,7 @@ TrialOutcome run_trial(const TrialProblem& problem, const Strings& effects, std:
   std::mt19937_64 random = random_of(problem.seed, trial);
   TrialOutcome outcome;
   outcome.trial = trial;
-  outcome.hidden = hidden_in(effects, trial, problem.pairs, random);
+  if (!problem.nulls) outcome.hidden = hidden_in(effects, trial, problem.pairs, random);
   try {
     const TrialCampaign campaign = draw_campaign(problem.rig, outcome.hidden, plan(problem, random), random);
     outcome.parameters = campaign.parameters;

@@ -17,6 +17,7 @@ struct TrialProblem {
   std::vector<std::string> effects;  ///< hidden in turn, and the candidates of the diagnosis; empty: all
   int trials = 20;
   bool pairs = false;                ///< hide two effects at a time
+  bool nulls = false;                ///< hide nothing, in no campaign: how often is something named that is not there?
   bool outside = false;              ///< what is hidden is not among the candidates: nothing should be named
   unsigned seed = 1;
   std::vector<Run> recordings;       ///< whose conditions, motion, sampling and noise the simulated runs repeat; none: runs are drawn

@@ -28,10 +28,11 @@ int trial_command(int argc, char** argv) {
   app.add_option("runs", recordings, "recordings (CSV) that the simulated runs repeat: their conditions, motion, release, sampling and noise; without any, two plucks and three steps are drawn");
   app.add_option("--effects", ids, "effects to hide in turn, and the candidates, separated by commas; without it, all")->delimiter(',')->allow_extra_args(false);
   app.add_option("--trials", problem.trials, "campaigns; every so many-th hides nothing")->capture_default_str()->check(CLI::Range(1, 1000000));
-  app.add_flag("--pairs", problem.pairs, "hide two effects at a time");
+  CLI::Option* const pairs = app.add_flag("--pairs", problem.pairs, "hide two effects at a time");
   app.add_option("--seed", problem.seed, "of the random numbers")->capture_default_str();
   app.add_option("--noise", noise, "standard deviation of the gauge's noise; without it that of the recordings, or 0.03 N");
   app.add_flag("--outside", problem.outside, "keep what is hidden from the candidates: the right verdict is `unexplained`");
+  app.add_flag("--nulls", problem.nulls, "hide nothing in any campaign: every name is a false alarm")->excludes(pairs)->excludes("--outside");
   app.add_option("--shard", shard, "i/n: only every n-th campaign, from the i-th on, for `unrig collect` to put together; without it as SLURM_ARRAY_TASK_ID or the rank under Open MPI say");
   app.add_option("--cases", problem.cases, "folder in which the outcome of each campaign is kept: a second call computes only what is missing");
   app.add_option_function<int>("--threads", use_threads, "how many threads to work in; without it, as many as the machine has")->check(CLI::Range(1, 256));

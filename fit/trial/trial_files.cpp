@@ -5,7 +5,6 @@
 
 #include <algorithm>
 #include <filesystem>
-#include <map>
 #include <nlohmann/json.hpp>
 #include <utility>
 
@@ -13,6 +12,7 @@
 #include "core/rig/fingerprint.h"
 #include "core/files/provenance.h"
 #include "core/files/text_file.h"
+#include "fit/trial/parts.h"
 
 namespace unrig {
 namespace {
@@ -99,23 +99,14 @@ TrialResult read_trial(const std::string& path) {
 
 TrialResult collected(const std::vector<TrialResult>& shards, const std::vector<std::string>& paths) {
   TrialResult all = shards.front();
-  std::map<std::size_t, std::pair<TrialOutcome, std::size_t>> by_trial;
+  std::vector<Part<TrialOutcome>> parts;
   for (std::size_t s = 0; s < shards.size(); ++s) {
-    if (shards[s].study != all.study || shards[s].trials != all.trials)
-      throw InputError({paths[s], 0}, "another study than " + paths.front(), "wanted the same version, rig, recordings, effects, options, seed and number of trials", "Collect each study by itself.");
-    for (const TrialOutcome& o : shards[s].outcomes) {
-      const auto [known, fresh] = by_trial.emplace(o.trial, std::pair{o, s});
-      if (!fresh && json_of(known->second.first, false) != json_of(o, false))
-        throw InputError({paths[s], 0}, fmt::format("another outcome of trial {} than {}", o.trial, paths[known->second.second]), "wanted the same from the same version and seed", "Run both shards again with one program.");
-    }
+    Part<TrialOutcome> part{paths[s], fmt::format("{} {}", shards[s].study, shards[s].trials), static_cast<std::size_t>(shards[s].trials), {}};
+    for (const TrialOutcome& o : shards[s].outcomes) part.cases.emplace_back(o.trial, o);
+    parts.push_back(std::move(part));
   }
-  std::vector<std::size_t> missing;
-  for (std::size_t i = 0; i < static_cast<std::size_t>(all.trials); ++i)
-    if (!by_trial.contains(i)) missing.push_back(i);
-  if (!missing.empty())
-    throw InputError({paths.back(), 0}, fmt::format("{} of {} trials are in none of the files, the first is number {}", missing.size(), all.trials, missing.front()), "wanted all shards", "Run the shards that are missing.");
-  all.outcomes.clear();
-  for (auto& [i, one] : by_trial) all.outcomes.push_back(std::move(one.first));
+  const PartsOf trials{"trial", "trials", "the same version, rig, recordings, effects, options, seed and number of trials"};
+  all.outcomes = all_cases(parts, trials, [](const TrialOutcome& a, const TrialOutcome& b) { return json_of(a, false) == json_of(b, false); });
   all.confusion.clear();
   all.scores.clear();
   all.nulls = all.false_alarms = all.wrong_names = all.misses = all.failures = 0;
@@ -128,31 +119,23 @@ std::string study_of(const TrialProblem& problem, const std::vector<std::string>
   std::vector<std::string> parts{provenance_of(0, nullptr).program, fingerprint(problem.rig), fmt::format("{} {} {}", problem.pairs, problem.outside, problem.seed), problem.noise ? fmt::format("{}", *problem.noise) : ""};
   for (const Run& run : problem.recordings) parts.push_back(base_name(run.file) + fingerprint(run, problem.rig));
   parts.insert(parts.end(), effects.begin(), effects.end());
+  if (problem.nulls) parts.emplace_back("nulls");
   return fingerprint(std::string_view(fmt::format("{}", fmt::join(parts, "\n"))));
 }
 
-TrialCases::TrialCases(const std::string& folder, const std::string& study) {
-  if (folder.empty()) return;
-  folder_ = (std::filesystem::path(folder) / study).string();
-  std::error_code failure;
-  std::filesystem::create_directories(folder_, failure);
-  if (failure) throw InputError({folder_, 0}, "the folder cannot be made: " + failure.message(), "wanted one to keep the outcomes in", "Name another with --cases.");
-}
-
-std::string TrialCases::path(std::size_t trial) const { return (std::filesystem::path(folder_) / fmt::format("{}.json", trial)).string(); }
+TrialCases::TrialCases(const std::string& folder, const std::string& study) : cases_(folder.empty() ? "" : (std::filesystem::path(folder) / study).string()) {}
 
 std::optional<TrialOutcome> TrialCases::find(std::size_t trial) const {
-  if (folder_.empty() || !std::filesystem::exists(path(trial))) return std::nullopt;
+  const std::optional<std::string> kept = cases_.find(fmt::format("{}.json", trial));
+  if (!kept) return std::nullopt;
   try {
-    const TrialOutcome outcome = outcome_of(ordered_json::parse(read_text(path(trial))));
+    const TrialOutcome outcome = outcome_of(ordered_json::parse(*kept));
     return outcome.trial == trial ? std::optional(outcome) : std::nullopt;
   } catch (const nlohmann::json::exception&) {
     return std::nullopt;  // damaged: computed again
   }
 }
 
-void TrialCases::keep(const TrialOutcome& outcome) const {
-  if (!folder_.empty()) write_text(path(outcome.trial), json_of(outcome, true).dump() + "\n");
-}
+void TrialCases::keep(const TrialOutcome& outcome) const { cases_.keep(fmt::format("{}.json", outcome.trial), json_of(outcome, true).dump() + "\n"); }
 
 }  // namespace unrig

@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "core/files/kept_cases.h"
 #include "core/files/provenance.h"
 #include "fit/trial/trial.h"
 
@@ -25,7 +26,7 @@ TrialResult collected(const std::vector<TrialResult>& shards, const std::vector<
 /// Sixteen hexadecimal digits of all that an outcome depends on: program version, rig, recordings, effects, options and seed, but neither shard nor number of trials.
 std::string study_of(const TrialProblem& problem, const std::vector<std::string>& effects);
 
-/// A folder with one file per trial of a study, each written whole: a call that was ended goes on where it stopped, and processes may share it.
+/// The outcomes of a study's trials in a folder of its own (core/files/kept_cases.h).
 class TrialCases {
  public:
   /// An empty `folder` keeps nothing. Throws InputError where the folder cannot be made.
@@ -35,8 +36,7 @@ class TrialCases {
   void keep(const TrialOutcome& outcome) const;
 
  private:
-  std::string path(std::size_t trial) const;
-  std::string folder_;
+  KeptCases cases_;
 };
 
 }  // namespace unrig

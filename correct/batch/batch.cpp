@@ -1,0 +1,417 @@
+#include "correct/batch/batch.h"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cstring>
+#include <filesystem>
+#include <map>
+#include <set>
+#include <stdexcept>
+#include <sstream>
+#include <thread>
+
+#include "core/files/error.h"
+#include "core/files/kept_cases.h"
+#include "core/files/provenance.h"
+#include "core/files/run_command.h"
+#include "core/files/text_file.h"
+#include "core/files/verbosity.h"
+#include "core/numerics/in_parallel.h"
+#include "core/rig/fingerprint.h"
+#include "correct/batch/batch_files.h"
+#include "correct/batch/batch_values.h"
+#include "correct/batch/child.h"
+#include "correct/correct_command.h"
+#include "fit/apparent_mass/apparent_mass_command.h"
+#include "fit/check/check_command.h"
+#include "fit/diagnose/diagnose_command.h"
+#include "fit/fit_command.h"
+
+namespace unrig {
+namespace {
+
+namespace fs = std::filesystem;
+using nlohmann::ordered_json;
+using Strings = std::vector<std::string>;
+
+constexpr std::size_t corrections_together = 16;
+constexpr int not_kept = 3;  // exit status of a child that crashed without a signal
+
+int run_of(const std::string& command, Strings words, bool* fault) {
+  static constexpr Command commands[] = {{"check", "", check_command}, {"fit", "", fit_command}, {"correct", "", correct_command}, {"apparent-mass", "", apparent_mass_command}, {"diagnose", "", diagnose_command}};
+  words.insert(words.begin(), command);
+  std::vector<char*> argv;
+  for (std::string& word : words) argv.push_back(word.data());
+  argv.push_back(nullptr);
+  for (const Command& c : commands)
+    if (command == c.name) return run_command(c, static_cast<int>(words.size()), argv.data(), fault);
+  throw std::logic_error("no command " + command);
+}
+
+/// A case with what is needed to compute it.
+struct Planned {
+  BatchCase result;
+  Strings words;              ///< arguments but for outputs and --fit
+  Strings files;              ///< that it reads, as the campaign names them
+  std::string key;
+  std::optional<std::size_t> fit;  ///< the case that a correction rests on
+  std::size_t turn = 0;       ///< which shard takes it: turn mod shards
+  bool settled = false;       ///< nothing to compute
+};
+
+/// The recording's head, or nothing of it: what is wrong is the commands' to say.
+void read_head(const std::string& text, BatchRow& row) {
+  const auto take = [&](const std::string& part) {
+    const Run run = parse_run(part, row.file);
+    row.kind = to_string(run.kind);
+    row.medium = run.medium;
+    row.density = run.density;
+    row.speed = run.speed;
+  };
+  std::size_t end = 0;
+  for (int rows = 0; rows < 10 && end != std::string::npos && end < text.size();) {
+    rows += text[end] == '#' ? 0 : 1;
+    end = text.find('\n', end);
+    if (end != std::string::npos) ++end;
+  }
+  for (const bool whole_file : {false, true}) try {
+      return take(whole_file ? text : text.substr(0, end));
+    } catch (const std::exception&) {  // the first rows alone may say too little
+    }
+}
+
+/// Turns the file of campaigns into cases.
+class Planner {
+ public:
+  explicit Planner(const Batch& batch) : batch_(batch) {
+    for (std::size_t c = 0; c < batch.campaigns.size(); ++c) add_campaign(c);
+  }
+  std::vector<Planned> cases;
+  std::vector<BatchRow> rows;
+
+  std::string study() const {
+    Strings all{program_};
+    for (const BatchRow& row : rows) all.push_back(fmt::format("{} {} {}", row.campaign_name, row.file, row.part));
+    for (const Planned& one : cases) all.push_back(fmt::format("{} {} {}", one.result.campaign, one.result.command, one.key));
+    return fingerprint(std::string_view(fmt::format("{}", fmt::join(all, "\n"))));
+  }
+
+ private:
+  void add_campaign(std::size_t index) {
+    const BatchCampaign& c = batch_.campaigns[index];
+    const std::size_t first = rows.size();
+    for (const std::string& file : c.all_runs()) {
+      BatchRow row;
+      row.campaign = index, row.run = rows.size() - first, row.campaign_name = c.name, row.file = file;
+      row.part = row.run < c.runs.size() ? "fitted" : row.run < c.runs.size() + c.heldout.size() ? "held out" : "further";
+      content(file, [&](const std::string& text) { read_head(text, row); });
+      rows.push_back(std::move(row));
+    }
+    turn_ += index > 0 ? 1 : 0;
+    std::optional<std::size_t> fit;
+    for (const std::string& command : c.commands) {
+      if (command == "correct") {
+        add_corrections(index, first, *fit);
+        continue;
+      }
+      Planned one = planned(index, command);
+      if (command == "check") {
+        one.files = c.runs;
+        one.files.insert(one.files.end(), c.heldout.begin(), c.heldout.end());
+        one.words.insert(one.words.end(), one.files.begin(), one.files.end());
+      } else if (command == "fit") {
+        one.files = c.runs;
+        one.words.insert(one.words.end(), c.runs.begin(), c.runs.end());
+        for (const std::string& effect : c.effects) one.words.insert(one.words.end(), {"--effect", effect});
+        for (const std::string& law : c.laws) {
+          one.files.push_back(law);
+          one.words.insert(one.words.end(), {"--law", law});
+        }
+      } else if (command == "diagnose") {
+        one.files = c.runs;
+        one.words.insert(one.words.end(), c.runs.begin(), c.runs.end());
+        for (const std::string& run : c.heldout) {
+          one.files.push_back(run);
+          one.words.insert(one.words.end(), {"--heldout", run});
+        }
+        if (!c.candidates.empty()) one.words.insert(one.words.end(), {"--effects", fmt::format("{}", fmt::join(c.candidates, ","))});
+      } else {
+        choose_decays(one, first);
+      }
+      if (c.anyway && (command == "fit" || command == "diagnose")) one.words.push_back("--anyway");
+      add(std::move(one));
+      if (command == "fit") fit = cases.size() - 1;
+    }
+  }
+
+  Planned planned(std::size_t campaign, const std::string& command) const {
+    Planned one;
+    one.result.campaign = campaign;
+    one.result.command = command;
+    one.words = {"--rig", batch_.campaigns[campaign].rig};
+    return one;
+  }
+
+  /// Of every run in a stream, and of a rig of modes of every one that is driven: no free decays.
+  void add_corrections(std::size_t index, std::size_t first, std::size_t fit) {
+    const BatchCampaign& c = batch_.campaigns[index];
+    std::size_t count = 0;
+    for (std::size_t r = first; r < rows.size(); ++r) {
+      const BatchRow& row = rows[r];
+      if (row.kind == "pluck" || (row.kind == "step" && row.speed == 0.0 && !rigs_.at(c.rig).modal)) continue;
+      if (count > 0 && count % corrections_together == 0) ++turn_;
+      ++count;
+      Planned one = planned(index, "correct");
+      one.result.run = row.run;
+      one.files = {row.file};
+      one.words.push_back(row.file);
+      if (c.anyway) one.words.push_back("--anyway");
+      one.fit = fit;
+      add(std::move(one));
+    }
+  }
+
+  /// The first of the thinnest medium and the first of the densest.
+  void choose_decays(Planned& one, std::size_t first) const {
+    const BatchRow *dry = nullptr, *wet = nullptr;
+    for (std::size_t r = first; r < rows.size(); ++r) {
+      if (rows[r].kind != "pluck" || rows[r].part != "fitted") continue;
+      if (!dry || *rows[r].density < *dry->density) dry = &rows[r];
+      if (!wet || *rows[r].density > *wet->density) wet = &rows[r];
+    }
+    if (!dry || *dry->density == *wet->density) {
+      one.settled = true;
+      one.result.status = CaseStatus::unusable;
+      one.result.messages = {"no two free decays in media of different density among the runs; wanted one in air and one in the fluid"};
+      return;
+    }
+    one.files = {dry->file, wet->file};
+    one.words.insert(one.words.end(), {"--dry", dry->file, "--wet", wet->file});
+  }
+
+  /// With its key: what it depends on by content, in order; files by the place that they have among the words.
+  void add(Planned one) {
+    const std::string rig = batch_.campaigns[one.result.campaign].rig;
+    Strings parts{program_, one.result.command, rig_of(rig).fingerprint};
+    for (const std::string& word : one.words)
+      if (word != rig) parts.push_back(std::find(one.files.begin(), one.files.end(), word) != one.files.end() ? "file " + content(word) : word);
+    if (one.fit) parts.push_back(cases[*one.fit].key);
+    for (const std::string& message : one.result.messages) parts.push_back(message);
+    one.key = fingerprint(std::string_view(fmt::format("{}", fmt::join(parts, "\n"))));
+    one.files.insert(one.files.begin(), rig);
+    one.turn = turn_;
+    cases.push_back(std::move(one));
+  }
+
+  struct KnownRig {
+    std::string fingerprint;
+    bool modal = false;
+  };
+  /// Its text, and its numbers, of which some may stand in files that it names.
+  const KnownRig& rig_of(const std::string& name) {
+    const auto [known, fresh] = rigs_.try_emplace(name);
+    if (fresh) {
+      known->second.fingerprint = content(name);
+      try {
+        const Rig rig = read_rig(path_of(name));
+        known->second.fingerprint += fingerprint(rig);
+        known->second.modal = rig.is_modal();
+      } catch (const InputError&) {  // the commands say why
+      }
+    }
+    return known->second;
+  }
+
+  std::string path_of(const std::string& name) const { return (fs::path(batch_.folder) / name).string(); }
+
+  /// Fingerprint of a file; `look` sees its text when it is read for the first time.
+  std::string content(const std::string& name, const std::function<void(const std::string&)>& look = {}) {
+    const auto [known, fresh] = contents_.try_emplace(name, "absent");
+    if (!fresh && !look) return known->second;
+    try {
+      const std::string text = read_text(path_of(name));
+      known->second = fingerprint(std::string_view(text));
+      if (look) look(text);
+    } catch (const InputError&) {  // the commands say why
+    }
+    return known->second;
+  }
+
+  const Batch& batch_;
+  std::string program_ = provenance_of(0, nullptr).program;
+  std::map<std::string, std::string> contents_;
+  std::map<std::string, KnownRig> rigs_;
+  std::size_t turn_ = 0;
+};
+
+const char* result_of(const std::string& command) {
+  if (command == "correct") return "corrected.csv";
+  if (command == "apparent-mass") return "apparent.json";
+  return command == "check" ? "check.json" : command == "fit" ? "fit.json" : "diagnosis.json";
+}
+
+/// What a command said on standard error, sorted.
+void take_said(BatchCase& one, const std::string& said) {
+  const std::string own = "unrig " + one.command + ": ", no_answer = "warning: no trustworthy answer: ", warning = "warning: ";
+  std::istringstream lines(said);
+  for (std::string line; std::getline(lines, line);) {
+    if (line.empty() || line.starts_with("progress: ")) continue;
+    if (line.starts_with(no_answer)) one.messages.push_back(line.substr(no_answer.size()));
+    else if (line.starts_with(warning)) one.warnings.push_back(line.substr(warning.size()));
+    else if (line.starts_with("check: ") && one.status == CaseStatus::done) one.warnings.push_back(line);
+    else one.messages.push_back(line.starts_with(own) ? line.substr(own.size()) : line);
+  }
+}
+
+/// The computing of cases and the files that they are kept in: KEY.json, written last, and beside it the result as the command wrote it.
+class Workshop {
+ public:
+  Workshop(const BatchProblem& problem, const std::vector<Planned>& cases) : batch_(problem.batch), cases_(cases), kept_(fs::absolute(problem.cases).string()) {}
+
+  /// As it was kept, under today's names of its files.
+  std::optional<BatchCase> find(const Planned& one) const {
+    const std::optional<std::string> text = kept_.find(one.key + ".json");
+    if (!text) return std::nullopt;
+    std::optional<BatchCase> found = kept_case(*text, one.files);
+    if (!found || found->command != one.result.command) return std::nullopt;
+    found->campaign = one.result.campaign;
+    found->run = one.result.run;
+    return found;
+  }
+
+  /// In a process of its own: computes and keeps a case.
+  int compute(const Planned& one, int threads, std::FILE* said) const try {
+    fs::current_path(batch_.folder);  // every file is called as the campaign calls it
+    set_verbosity(Verbosity::normal);
+    use_threads(threads);
+    const std::string output = kept_.path(one.key + "." + result_of(one.result.command));
+    Strings words = one.words;
+    words.insert(words.end(), {"-o", output});
+    if (one.fit) words.insert(words.end(), {"--fit", fit_for(one)});
+    if (one.result.command == "correct" && !is_modal(batch_.campaigns[one.result.campaign].rig)) words.insert(words.end(), {"--indicial", kept_.path(one.key + ".indicial.csv")});
+    bool fault = false;
+    const int status = run_of(one.result.command, words, &fault);
+    if (fault) return not_kept;
+    BatchCase result = one.result;
+    result.status = status == exit_done ? CaseStatus::done : status == exit_no_answer ? CaseStatus::no_answer : CaseStatus::unusable;
+    take_said(result, whole(said));
+    if (status != exit_wrong_use && fs::exists(output)) take_values(result, read_text(output), batch_.campaigns[result.campaign].all_runs());
+    if (status == exit_no_answer && result.messages.empty())
+      for (const BatchValue& value : result.values)
+        if (value.name == "verdict") result.messages.push_back(value.value);
+    kept_.keep(one.key + ".json", kept_text(result, one.files));
+    return 0;
+  } catch (const std::exception& e) {
+    std::fprintf(stderr, "%s\n", e.what());
+    return not_kept;
+  }
+
+ private:
+  static bool is_modal(const std::string& rig) try {
+    return read_rig(rig).is_modal();
+  } catch (const InputError&) {
+    return false;
+  }
+
+  /// The fit that a correction rests on, with its runs called as they are now.
+  std::string fit_for(const Planned& one) const {
+    const std::string path = kept_.path(cases_[*one.fit].key + ".fit.json");
+    ordered_json fit = ordered_json::parse(read_text(path));
+    const Strings& runs = batch_.campaigns[one.result.campaign].runs;
+    std::map<std::string, std::string> now;
+    for (std::size_t r = 0; r < runs.size(); ++r) now[fit.at("runs").at(r).at("file")] = runs[r];
+    if (std::all_of(now.begin(), now.end(), [](const auto& name) { return name.first == name.second; })) return path;
+    for (ordered_json& run : fit.at("runs")) run["file"] = now.at(run.at("file"));
+    for (const char* list : {"parameters", "givens"})
+      if (fit.contains(list))
+        for (ordered_json& item : fit.at(list))
+          if (item.contains("run") && now.contains(item.at("run"))) item["run"] = now.at(item.at("run"));
+    kept_.keep(one.key + ".fit.json", fit.dump(2) + "\n");
+    return kept_.path(one.key + ".fit.json");
+  }
+
+  const Batch& batch_;
+  const std::vector<Planned>& cases_;
+  KeptCases kept_;
+};
+
+}  // namespace
+
+std::string to_string(CaseStatus status) {
+  static constexpr const char* words[] = {"done", "left out", "no answer", "unusable", "failed"};
+  return words[static_cast<std::size_t>(status)];
+}
+
+BatchResult run_batch(const BatchProblem& problem) {
+  const Planner plan(problem.batch);
+  const Workshop workshop(problem, plan.cases);
+  BatchResult result;
+  result.study = plan.study();
+  result.rows = plan.rows;
+  result.planned = plan.cases.size();
+  result.shard = problem.shard;
+  result.shards = problem.shards;
+
+  std::map<std::size_t, std::optional<BatchCase>> wanted;  // this shard's, and fits that its corrections rest on
+  for (std::size_t i = 0; i < plan.cases.size(); ++i)
+    if (plan.cases[i].turn % problem.shards == problem.shard - 1) wanted[i] = plan.cases[i].settled ? plan.cases[i].result : workshop.find(plan.cases[i]);
+  std::set<std::size_t> borrowed;
+  for (const auto& [i, known] : wanted)
+    if (const std::optional<std::size_t> fit = plan.cases[i].fit; !known && fit && !wanted.contains(*fit)) borrowed.insert(*fit);
+  for (const std::size_t fit : borrowed) wanted[fit] = workshop.find(plan.cases[fit]);
+
+  std::vector<std::size_t> pending;
+  for (const auto& [i, known] : wanted)
+    if (!known) pending.push_back(i);
+  const std::size_t most = problem.threads > 0 ? static_cast<std::size_t>(problem.threads) : std::max(1u, std::thread::hardware_concurrency());
+  const auto tell = [&](std::size_t at_work) {
+    if (problem.progress) problem.progress(fmt::format("{} of {} cases", wanted.size() - pending.size() - at_work, wanted.size()));
+  };
+  Children children;
+  std::set<std::string> at_work;  // keys: of two campaigns with the same content one is computed
+  while (!pending.empty() || children.running() > 0) {
+    for (std::size_t p = 0; p < pending.size() && children.running() < most;) {
+      const std::size_t i = pending[p];
+      const Planned& one = plan.cases[i];
+      const std::optional<BatchCase>* const fit = one.fit ? &wanted.at(*one.fit) : nullptr;
+      if ((fit && !*fit) || at_work.contains(one.key)) {
+        ++p;
+        continue;
+      }
+      pending.erase(pending.begin() + static_cast<std::ptrdiff_t>(p));
+      if (fit && (*fit)->status != CaseStatus::done) {
+        wanted[i] = one.result;
+        wanted[i]->status = CaseStatus::left_out;
+        wanted[i]->messages = {"there is no fit to rest on"};
+      } else if (std::optional<BatchCase> known = workshop.find(one)) {  // another process has done it meanwhile
+        wanted[i] = std::move(known);
+      } else {
+        const int threads = static_cast<int>(std::max<std::size_t>(1, most / std::min(most, children.running() + pending.size() + 1)));
+        at_work.insert(one.key);
+        children.start(i, [&](std::FILE* said) { return workshop.compute(one, threads, said); });
+      }
+      tell(children.running());
+    }
+    if (children.running() == 0) continue;
+    const Children::Ended ended = children.wait();
+    const Planned& one = plan.cases[ended.job];
+    at_work.erase(one.key);
+    std::optional<BatchCase>& outcome = wanted[ended.job];
+    if (ended.status == 0 && ended.signal == 0) outcome = workshop.find(one);
+    if (!outcome) {
+      outcome = one.result;
+      outcome->status = CaseStatus::failed;
+      take_said(*outcome, ended.said);
+      if (ended.signal != 0) outcome->messages.push_back(fmt::format("ended by signal {} ({})", ended.signal, ::strsignal(ended.signal)));
+    }
+    tell(children.running());
+  }
+  for (auto& [i, outcome] : wanted)
+    if (!borrowed.contains(i)) result.cases.emplace_back(i, std::move(*outcome));
+  return result;
+}
+
+}  // namespace unrig

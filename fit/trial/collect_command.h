@@ -1,8 +1,0 @@
-#pragma once
-
-namespace unrig {
-
-/// `unrig collect part1.json part2.json ... -o all.json`
-int collect_command(int argc, char** argv);
-
-}  // namespace unrig
