@@ -120,7 +120,8 @@ std::vector<Filling> filled(const BatchResult& result, std::map<std::string, Blo
     rows_of_campaign[result.rows[r].campaign].push_back(r);
   }
   std::vector<Filling> rows(result.rows.size());
-  for (const auto& [number, one] : result.cases) {
+  for (const auto& numbered : result.cases) {
+    const auto& one = numbered.second;
     Block& block = blocks[one.command];
     const auto put = [&](Filling& row, const Values& values) {
       for (const BatchValue& v : values) {
@@ -284,7 +285,8 @@ std::string report(const BatchResult& result) {
     }
   constexpr int most = 20;
   int told = 0;
-  for (const auto& [number, one] : result.cases) {
+  for (const auto& numbered : result.cases) {
+    const auto& one = numbered.second;
     if (one.status == CaseStatus::done || one.status == CaseStatus::left_out) continue;
     if (++told > most) continue;
     const auto row = std::find_if(result.rows.begin(), result.rows.end(), [&](const BatchRow& r) { return r.campaign == one.campaign; });
