@@ -65,7 +65,7 @@ TEST(ImportTemplate, TakesNothingForNewtonsThatTheFileDoesNotCallSo) {
   EXPECT_THAT(read_text(map), HasSubstr("# ? The file gives no time: how many samples a second?"));
   const Finished imported = run_unrig(directory, {"import", log, "--map", map, "-o", run});
   ASSERT_EQ(imported.status, 0) << imported.err;
-  EXPECT_THAT(imported.err, HasSubstr("gauge stays in V"));
+  EXPECT_THAT(imported.err, HasSubstr("\"gauge\" stays in V: the file gives no calibration"));
 }
 
 TEST(ImportTemplate, OfAHammerRecordIsForced) {
