@@ -40,6 +40,7 @@ void append_mode(LinearSystem& system, const EffectContext& c) {
 /// with amplitude pass for two. Source: R. H. Lyon, R. G. DeJong, Theory and Application of Statistical Energy Analysis (1995), modal overlap. And whether its decay time, 1/(2 pi zeta f), is within the record:
 /// one that does not decay there is a tone, of the mains for instance.
 bool stands_apart(const AeroelasticModel& model, const Eigen::VectorXd& theta, double seconds) {
+  if (!model.rig().is_modal()) return true;
   const double f = theta[model.index("higher-mode.frequency")], half_width = theta[model.index("higher-mode.damping_ratio")] * f;
   if (2 * std::numbers::pi * half_width * seconds < 1) return false;
   for (std::size_t i = 0; i < model.rig().modal.size(); ++i) {

@@ -310,6 +310,15 @@ TEST(Effects, SayWhyADiagnosisTriesThemOnlyWhereNamed) {
   EXPECT_THAT(ids, testing::UnorderedElementsAre("bouc-wen", "cubic-damping"));
 }
 
+TEST(Effects, AreDistinctAtTheirStarts) {
+  for (const Rig& rig : {beam(), two_modes()})
+    for (const Effect& e : effects()) {
+      if (!e.distinct) continue;
+      const AeroelasticModel model = AeroelasticModel(rig, rig.is_modal() ? Basis{} : make_basis(rig, Index{2}, Index{1}), wagner(Wagner::jones)).with_effects({e.id});
+      EXPECT_TRUE(e.distinct(model, model.start_values(), 100)) << e.id << " of " << rig.file;
+    }
+}
+
 /// Peaks overlap within half of the sum of their half-power bandwidths.
 TEST(Effects, AModeThatMakesOnePeakWithAKnownOneIsNotDistinct) {
   const Rig rig = two_modes();
