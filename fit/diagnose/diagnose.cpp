@@ -274,26 +274,28 @@ MissingEffect missing_description(const RigDescription& description, const Expla
   return m;
 }
 
-/// The rig's description against the laws that were `found`: with laws beside it where neither explains everything. True where it is the better explanation, then in `found`.
-bool weigh(const DiagnoseProblem& problem, const Setting& files, const Trial& baseline, const RigDescription& description, Selection& selection, Explanation& found) {
-  const std::vector<std::string> itself{rig_description_id};
-  const double against_baseline = bic_difference(description.trial, baseline) + description.cost;
-  selection.add({itself, description.trial.reduced_chi2(), against_baseline, 0, description.promised});
-  if (found.explains() && against_baseline > -decisive) return false;
-  const Setting put_right{description.problem.get(), &description.heldout};
-  Explanation with = look_at(problem, files, baseline, put_right, description.trial, description.cost);
-  if (!with.explains() && !found.explains()) {
-    DiagnoseProblem there = problem;
-    there.rig = description.problem->rig;
-    Selection beside(there, *description.problem, description.trial);
-    with = look_at(problem, files, baseline, put_right, beside.best_set(), description.cost);
-    for (Candidate c : beside.ranking()) {
-      if (c.effects.empty()) continue;
-      c.effects.insert(c.effects.begin(), itself.front());
-      c.delta_bic += against_baseline;
-      selection.add(std::move(c));
-    }
+/// Laws beside the rig's description put right; what was tried is added to the ranking of `selection`.
+Explanation laws_beside(const RigDescription& description, const DiagnoseProblem& problem, const Setting& files, const Trial& baseline, Selection& selection) {
+  DiagnoseProblem there = problem;
+  there.rig = description.problem->rig;
+  Selection beside(there, *description.problem, description.trial);
+  Explanation with = look_at(problem, files, baseline, {description.problem.get(), &description.heldout}, beside.best_set(), description.cost);
+  for (Candidate c : beside.ranking()) {
+    if (c.effects.empty()) continue;
+    c.effects.insert(c.effects.begin(), rig_description_id);
+    c.delta_bic += bic_difference(description.trial, baseline) + description.cost;
+    selection.add(std::move(c));
   }
+  return with;
+}
+
+/// The rig's description against the laws that were `found`: with laws `beside` it, as far as these were looked for, where neither explains everything. True where it is the better explanation, then in `found`.
+bool weigh(const DiagnoseProblem& problem, const Setting& files, const Trial& baseline, const RigDescription& description, std::optional<Explanation> beside, Selection& selection, Explanation& found) {
+  const double against_baseline = bic_difference(description.trial, baseline) + description.cost;
+  selection.add({{rig_description_id}, description.trial.reduced_chi2(), against_baseline, 0, description.promised});
+  if (found.explains() && against_baseline > -decisive) return false;
+  Explanation with = beside ? std::move(*beside) : look_at(problem, files, baseline, {description.problem.get(), &description.heldout}, description.trial, description.cost);
+  if (!with.explains() && !found.explains() && !beside) with = laws_beside(description, problem, files, baseline, selection);
   const bool laws_named = !found.best.effects.empty() && naming_of(found.best, baseline, found.clean(), found.predicts) == Naming::named;
   if (!with.explains() || (laws_named && bic_difference(found.best, with.best) - with.cost < -decisive)) return false;
   found = std::move(with);
@@ -320,19 +322,26 @@ Diagnosis diagnose_in_order(const DiagnoseProblem& problem, bool numbers_known) 
   if (coloured) d.mismatch = locate_mismatch(baseline.arrival.joint);
   std::optional<RigDescription> description = d.mismatch.found && !numbers_known ? describe_rig(problem, baseline) : std::nullopt;
   // What a set leaves may be noise that is not white, in which all is to be held against each other anew, or the rig's description.
-  bool anew = false;
+  const Setting files{&fit_problem, &problem.heldout};
+  auto selection = std::make_unique<Selection>(problem, fit_problem, baseline);
+  bool anew = false, asked = numbers_known;
+  std::optional<Explanation> beside;  // the rig's description and laws
   const auto noise_or_rig = [&](const Trial& set) {
     if (Trial there = set; !coloured && explained_by_noise(there)) {
       take_noise_of(baseline, there);
       return coloured = anew = true;
     }
-    if (numbers_known || (description && description->left < explained)) return false;
-    std::optional<RigDescription> beside = describe_rig(problem, set);
-    if (!beside || beside->left > explained) return false;
-    description = std::move(beside);
+    if (asked || (description && description->left < explained)) return false;
+    std::optional<RigDescription> rig = describe_rig(problem, set, enough_to_name);
+    if (!rig || rig->left > explained) return false;
+    asked = true;
+    Explanation with = laws_beside(*rig, problem, files, baseline, *selection);
+    if (!with.explains()) return false;
+    description = std::move(rig);
+    with.setting = {description->problem.get(), &description->heldout};
+    beside = std::move(with);
     return true;
   };
-  auto selection = std::make_unique<Selection>(problem, fit_problem, baseline);
   Trial best_set = selection->best_set(noise_or_rig);
   if (anew) {
     tell("trying what may be missing, in noise of the colour that is left");
@@ -341,9 +350,8 @@ Diagnosis diagnose_in_order(const DiagnoseProblem& problem, bool numbers_known) 
     best_set = selection->best_set(noise_or_rig);
   }
   if (!problem.verdict_only) d.maps = residual_maps(baseline.arrival.joint, d.mismatch.runs);
-  const Setting files{&fit_problem, &problem.heldout};
   Explanation found = look_at(problem, files, baseline, files, std::move(best_set), 0);
-  const bool described = description && weigh(problem, files, baseline, *description, *selection, found);
+  const bool described = description && weigh(problem, files, baseline, *description, std::move(beside), *selection, found);
   const Trial& best = found.best;
   d.ranking = selection->ranking();
   d.remaining = found.remaining;

@@ -50,13 +50,10 @@ VectorXd smoothed(const VectorXd& x, Index half) {
   return out;
 }
 
-/// Whether what is left at rest is noise whatever its level and tails: white, and its size too (A. I. McLeod, W. K. Li, J. Time Series Anal. 4 (1983) 269; of the absolute value, which has a variance where
-/// the fourth moment has not). What a model lacks comes and goes with the motion.
+/// Whether what is left at rest is noise, whatever its level and tails: white, and even over the record. What a model lacks comes and goes with the motion.
 bool is_noise(const RunResidual& run, const VectorXd& left) {
   const VectorXd resting = residual_at_rest(left, run.motion().phases(), run.linear_unknowns());
-  const double mean = resting.cwiseAbs().sum() / static_cast<double>((resting.array() != 0).count());
-  const VectorXd size = (resting.array() != 0).select(resting.cwiseAbs().array() - mean, 0.0);
-  return whiteness({resting}) > significant && whiteness({size}) > significant;
+  return whiteness({resting}) > significant && evenness(resting) > significant;
 }
 
 bool is_linear(const RunResidual& run, const VectorXd& theta) { return run.model().system(run.conditions(), theta, run.channels()).feedback.empty(); }

@@ -97,7 +97,7 @@ double change_of_load(const FitProblem& from, const FitResult& before, const Fit
   return count > 0 ? sum / count : 0;
 }
 
-std::optional<RigDescription> describe_rig(const DiagnoseProblem& problem, const Trial& from) {
+std::optional<RigDescription> describe_rig(const DiagnoseProblem& problem, const Trial& from, double least) {
   if (problem.progress) problem.progress("looking at the rig's description");
   FitProblem usual = with_usual_errors(problem);
   usual.effects = from.effects;
@@ -108,9 +108,8 @@ std::optional<RigDescription> describe_rig(const DiagnoseProblem& problem, const
     run.temper(1);
     freedom += static_cast<double>(run.degrees_of_freedom());
   }
-  constexpr double half = 0.5;
   const double promised = inexact.promises(arrival) / (arrival.joint.chi2() - freedom);
-  if (!(promised > half)) return {};
+  if (!(promised > least)) return {};
 
   inexact.search(arrival);
   auto moved = std::make_shared<FitProblem>();

@@ -27,9 +27,9 @@ struct RigDescription {
 ///
 ///   least of chi-square(theta, z) + z^T z,   twice the logarithm of the evidence = -(difference of BIC + z^T z + ln det(I + K)),
 ///
-/// z independent standard normal deviations of the numbers, K what the runs say of z with theta eliminated (fit/givens/inexact_rig.h). None where one linear step would leave more than half of the
-/// excess of chi-square.
-std::optional<RigDescription> describe_rig(const DiagnoseProblem& problem, const Trial& from);
+/// z independent standard normal deviations of the numbers, K what the runs say of z with theta eliminated (fit/givens/inexact_rig.h). None where one linear step promises less than the share
+/// `least` of the excess of chi-square.
+std::optional<RigDescription> describe_rig(const DiagnoseProblem& problem, const Trial& from, double least = 0.5);
 
 /// By how many per cent the loads at the ends of the steps change from one fit to another, on the mean; 0 where no run is a step. Load: s rho U^2 b L of a strip (core/model/strip_theory.h).
 double change_of_load(const FitProblem& from, const FitResult& before, const FitProblem& to, const FitResult& after);

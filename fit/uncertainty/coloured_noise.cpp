@@ -131,6 +131,18 @@ VectorXd residual_at_rest(const VectorXd& residual, const std::vector<MotionBasi
   return resting.squaredNorm() / rests >= residual.squaredNorm() / all ? resting : residual;
 }
 
+double evenness(const VectorXd& residual) {
+  std::vector<double> size;
+  for (const double x : residual)
+    if (x != 0) size.push_back(std::abs(x));
+  const Eigen::Map<const Eigen::ArrayXd> sizes(size.data(), static_cast<Index>(size.size()));
+  if (sizes.size() < 2) return 1;
+  const double mean = sizes.mean(), deviation = std::sqrt((sizes - mean).square().mean());
+  double sum = 0, furthest = 0;
+  for (const double x : size) furthest = std::max(furthest, std::abs(sum += x - mean));
+  return deviation > 0 ? kolmogorov(furthest / (deviation * std::sqrt(static_cast<double>(size.size())))) : 1;
+}
+
 double whiteness(const std::vector<VectorXd>& residuals) {
   double least = 1;
   for (const VectorXd& residual : residuals) {

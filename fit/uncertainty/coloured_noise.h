@@ -51,4 +51,8 @@ Eigen::VectorXd residual_at_rest(const Eigen::VectorXd& residual, const std::vec
 /// most coloured of the channels, times the number of channels. Left-out samples are 0.
 double whiteness(const std::vector<Eigen::VectorXd>& residuals);
 
+/// Probability that independent noise of one distribution, whatever its level and tails, comes as unevenly over the record: sums of its size about the mean, held against a Brownian bridge (R. L. Brown, J. Durbin and
+/// J. M. Evans, J. Royal Statistical Society B 37 (1975) 149). Of the absolute value, which has a variance where squares have none. Left-out samples are 0.
+double evenness(const Eigen::VectorXd& residual);
+
 }  // namespace unrig
