@@ -93,9 +93,9 @@ with tempfile.TemporaryDirectory() as folder:
         assert checks and all(line in refused.stderr.splitlines() for line in checks), checks
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
-        checked, forced = unrig.check(rig, suspect), unrig.fit(rig, suspect, anyway=True)
+        checked, forced = unrig.check(rig, suspect), unrig.fit(rig, [runs[0], str(pounds)], anyway=True)
         subprocess.run([program, "check", "--rig", rig, *suspect, "-o", folder / "check.json", "--quiet"], check=False, capture_output=True)
-        subprocess.run([program, "fit", "--rig", rig, *suspect, "--anyway", "-o", folder / "anyway.json", "--quiet"], check=False, capture_output=True)
+        subprocess.run([program, "fit", "--rig", rig, runs[0], pounds, "--anyway", "-o", folder / "anyway.json", "--quiet"], check=False, capture_output=True)
     written = json.loads((folder / "check.json").read_text())
     assert not checked.trustworthy and {key: checked.data[key] for key in ("rig", "runs", "suspicions", "determined")} == {key: written[key] for key in ("rig", "runs", "suspicions", "determined")}
     assert forced.data["parameters"] == json.loads((folder / "anyway.json").read_text())["parameters"]
