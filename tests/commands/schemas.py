@@ -67,6 +67,8 @@ def make_results(out):
 
     unrig("diagnose", *campaign("null", *decays, "step_a.csv"), "--heldout", null / "heldout.csv", "-o", out / "diagnosis.json")
     unrig("diagnose", *campaign("drag", "wet_pluck.csv"), "--effects", "quadratic-drag", "--fit", out / "fit_winning.json", "-o", out / "diagnosis_drag.json", status=(0, 1))
+    long_chord = write(out / "long_chord.toml", (null / "rig.toml").read_text().replace('chord = "6 in"', 'chord = "6.06 in"'))
+    unrig("diagnose", "--rig", long_chord, *(null / run for run in (*decays, "step_a.csv", "step_b.csv", "step_c.csv")), "--effects", "tank-wave", "-o", out / "diagnosis_rig.json")
     unrig("diagnose", *campaign("wave", *decays, "step_a.csv"), "--effects", "coulomb-friction", "-o", out / "diagnosis_unexplained.json", status=(1,))
 
     for shard in (1, 2):
