@@ -25,7 +25,8 @@ double cost_of(const Colours& colours, Index readings) {
 }  // namespace
 
 void choose_colour(RunInLegs& legs, Search& search, const std::vector<ChannelColour>& expected, double enough) {
-  if (legs.size() > 1 || !legs.residual(0).may_be_coloured()) return;
+  const bool has_laws = legs.size() == 1 && legs.residual(0).largest_arguments(search.solution.theta).size() > 0;  // each look at another colour is a search of its own
+  if (legs.size() > 1 || has_laws || !legs.residual(0).may_be_coloured()) return;
   const RunInLegs white = legs;
   const Index readings = white.residual(0).observations();
   double surprise = minus_twice_log_evidence(white.residual(0), search);
