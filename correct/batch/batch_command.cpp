@@ -32,7 +32,7 @@ constexpr const char* example = R"(Example of a file of campaigns; paths and pat
   rig = "rig.toml"
   runs = ["*.csv"]
 
-Calls:
+Example:
   unrig batch campaigns.toml -o table.csv --report table.html
   for i in 1 2 3; do unrig batch campaigns.toml --shard $i/3 -o part$i.json; done; unrig collect part*.json -o table.csv)";
 

@@ -20,7 +20,7 @@ folder = "*"
 rig = "rig.toml"
 runs = ["*_pluck.csv"]
 TOML
-"$unrig" batch campaigns.toml -o one.csv --cases elsewhere > /dev/null 2>&1
+"$unrig" batch campaigns.toml -o one.csv --cases elsewhere > /dev/null 2>&1 || [ $? = 1 ]  # drag is in no fit
 snakemake --snakefile "$sources/sample_data/cluster/Snakefile" --cores 2 --config campaigns=campaigns.toml shards=3 unrig="$unrig" > snakemake.log 2>&1 || { cat snakemake.log; exit 1; }
 cmp one.csv table.csv
 [ -s table.html ]
