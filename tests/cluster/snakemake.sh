@@ -11,12 +11,13 @@ cd "$folder"
 HOME=$folder XDG_CACHE_HOME=$folder/cache
 export HOME XDG_CACHE_HOME
 snakemake --version > version.log 2>&1 || { cat version.log; skip "snakemake does not start here"; }
-for campaign in null drag; do ln -s "$sources/sample_data/campaigns/$campaign" .; done
+mkdir runs
+for campaign in null drag; do ln -s "$sources/sample_data/campaigns/$campaign" runs; done
 cat > campaigns.toml << 'TOML'
 unrig_batch = 1
 commands = ["check", "fit"]
 [[campaign]]
-folder = "*"
+folder = "runs/*"
 rig = "rig.toml"
 runs = ["*_pluck.csv"]
 TOML
