@@ -241,6 +241,27 @@ bool explained_by_noise(Trial& trial) {
   return true;
 }
 
+/// BIC of the readings, comparable between noises: -2 ln likelihood with each run's own variance, n ln(variance) - 2 ln(density of the noise where all innovations are 0), plus ln(samples) per variable. The states of a
+/// whitening filter are among the variables, as many as its noise has powers.
+double bic_in_its_noise(const Trial& trial) {
+  double sum = 0, samples = 0;
+  for (std::size_t r = 0; r < trial.variance.size(); ++r) {
+    const RunResidual& run = trial.arrival.joint.runs()[r];
+    double count = 0;
+    for (std::size_t c = 0; c < run.channels().size(); ++c) count += static_cast<double>((run.channel_weight(c).array() > 0).count());
+    sum += count * std::log(trial.variance[r]) - 2 * run.log_noise_density();
+    samples += count;
+  }
+  return sum + trial.variables * std::log(samples);
+}
+
+/// Whether effects in white noise explain all that a fit leaves, and better than noise of a colour does.
+bool effects_beat_noise(const DiagnoseProblem& problem, const FitProblem& fit_problem, const Trial& white, const Trial& coloured) {
+  Selection selection(problem, fit_problem, white);
+  const Trial best = selection.best_set();
+  return !best.effects.empty() && !what_remains(best).found && bic_in_its_noise(best) - bic_in_its_noise(coloured) < -decisive;
+}
+
 /// `numbers_known`: what their files state of their uncertainty has been allowed for.
 Diagnosis diagnose_in_order(const DiagnoseProblem& problem, bool numbers_known = false);
 
@@ -318,7 +339,13 @@ Diagnosis diagnose_in_order(const DiagnoseProblem& problem, bool numbers_known) 
   refuse_short_runs(baseline.arrival.joint);
   Diagnosis d;
   d.mismatch = locate_mismatch(baseline.arrival.joint);
-  bool coloured = d.mismatch.found && explained_by_noise(baseline);
+  Trial in_colour = baseline;
+  bool coloured = d.mismatch.found && explained_by_noise(in_colour);
+  if (coloured) {
+    tell("noise of a colour explains what is left; asking whether effects explain it better");
+    coloured = !effects_beat_noise(problem, fit_problem, baseline, in_colour);
+  }
+  if (coloured) baseline = std::move(in_colour);
   if (coloured) d.mismatch = locate_mismatch(baseline.arrival.joint);
   std::optional<RigDescription> description = d.mismatch.found && !numbers_known ? describe_rig(problem, baseline) : std::nullopt;
   // What a set leaves may be noise that is not white, in which all is to be held against each other anew, or the rig's description.
