@@ -40,6 +40,7 @@ Effect bouc_wen() {
   e.id = "bouc-wen";
   e.summary = "hysteresis of the rig";
   e.equation = "F = -F_y z, z' = v/x_y (1 - |z|^n (b + (1 - b) sign(v z)))";
+  e.kind = "memory";
   e.source = "Wen, J. Engineering Mechanics 102 (1976) 249";
   e.parameters = {{"force", "N", 0, 0, 1e6, false, sizes}, {"yield_displacement", "m", 1e-3, 1e-9, 1, false, sizes}, {"shape", "1", 0.5, 0, 1, false, sizes}, {"sharpness", "1", 1, 0.5, 4, false, sizes}};
   e.starts = {Eigen::Vector4d(0.1, 1e-3, 0.5, 1)};

@@ -12,6 +12,7 @@ Effect carriage_vibration() {
   e.id = "carriage-vibration";
   e.summary = "the mount itself is shaken, at a frequency tied to carriage speed";
   e.equation = "mount velocity = a cos 2 pi f t + b sin 2 pi f t, f = kappa U";
+  e.kind = "signal";
   e.source = "Blevins, Flow-Induced Vibration (1990), chapter 7";
   e.parameters = {{"periods_per_length", "1/m", 10, 0.8, 120, false, "Record a run in the stream at another speed."}};
   e.starts = {Eigen::VectorXd::Constant(1, 10)};

@@ -17,6 +17,7 @@ Effect channel_delay() {
   e.id = "channel-delay";
   e.summary = "gauge channel late against the angle channel";
   e.equation = "gauge(t) = y(t - tau)";
+  e.kind = "signal";
   e.source = "Baker and Graves-Morris, Pade Approximants (1996), section 1.2";
   e.parameters = {{"time", "s", 0.004, 1e-4, 0.2, false, "Record a faster step of the angle."}};
   for (const double tau : {0.003, 0.008, 0.02, 0.05}) e.starts.push_back(Eigen::VectorXd::Constant(1, tau));

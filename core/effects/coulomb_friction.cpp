@@ -27,6 +27,7 @@ Effect coulomb_friction() {
   e.id = "coulomb-friction";
   e.summary = "dry friction in the rig";
   e.equation = "F = -F_c tanh(v/v_s)";
+  e.kind = "friction";
   e.source = "Coulomb (1781); Pennestri et al., Nonlinear Dynamics 83 (2016) 1785";
   e.parameters = {{"force", "N", 0, 0, 1e4, false, small_motions}, {"velocity", "m/s", 1e-3, 1e-6, 1, false, small_motions}};
   e.starts = {Eigen::Vector2d(0.1, 1e-3)};

@@ -21,6 +21,7 @@ Effect cubic_damping() {
   e.id = "cubic-damping";
   e.summary = "damping that grows with amplitude, as in joints";
   e.equation = "F = -c_3 v^3";
+  e.kind = "damping";
   e.source = "Rayleigh, Philosophical Magazine 15 (1883) 229";
   e.parameters = {{"coefficient", "N.s^3/m^3", 0, 0, 1e30, false, "Record free decays from a small and from a large load."}};
   e.starts = {Eigen::VectorXd::Constant(1, 1.0)};

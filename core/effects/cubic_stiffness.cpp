@@ -12,6 +12,7 @@ Effect cubic_stiffness() {
   e.id = "cubic-stiffness";
   e.summary = "stiffness that changes with amplitude";
   e.equation = "F = -k_3 ((h + d)^3 - d^3)";
+  e.kind = "stiffness";
   e.source = "Duffing, Erzwungene Schwingungen (1918)";
   e.parameters = {{"coefficient", "N/m^3", 0, -1e30, 1e30, false, "Record free decays from a small and from a large load."}, {"static_displacement", "m", 0, -1, 1, true, "Record a run at this steady load with larger motions."}};
   e.starts = {Eigen::Vector2d(0, 0)};

@@ -48,6 +48,7 @@ struct Effect {
   std::string id;
   std::string summary;   ///< one line
   std::string equation;  ///< as a person would write it
+  std::string kind;      ///< what physics it is: stiffness, damping, friction, memory, inertia, lift, speed, angle, signal, curve
   std::string source;
   /// Names without the id; `advice` says what to record to determine each.
   std::vector<Parameter> parameters;

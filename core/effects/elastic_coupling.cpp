@@ -11,6 +11,7 @@ Effect elastic_coupling() {
   e.id = "elastic-coupling";
   e.summary = "springs that act beside the pitch axis";
   e.equation = "F = -k_c theta, M = -k_c h";
+  e.kind = "stiffness";
   e.source = "Bisplinghoff, Ashley and Halfman, Aeroelasticity (1955)";
   e.parameters = {{"stiffness", "N/rad", 0, -1e9, 1e9, false, "Record a pluck off the pitch axis, with a sensor of the twist."}};
   e.starts = {Eigen::VectorXd::Zero(1)};

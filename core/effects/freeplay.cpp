@@ -42,6 +42,7 @@ Effect freeplay() {
   e.id = "freeplay";
   e.summary = "backlash, a gap in the torsional drive";
   e.equation = "M = -k (theta - clamp(theta, -delta, delta))";
+  e.kind = "stiffness";
   e.source = "Dowell et al., A Modern Course in Aeroelasticity (2015), chapter 11";
   e.parameters = {{"half_gap", "rad", 0, 0, 0.5, false, "Record a pluck off the pitch axis or a rapid step, with torsion that crosses the gap."}};
   e.starts = {Eigen::VectorXd::Constant(1, 1e-3)};

@@ -10,6 +10,7 @@ Effect gauge_drift() {
   e.id = "gauge-drift";
   e.summary = "slow zero drift of the gauge";
   e.equation = "gauge += c exp(-t/tau)";
+  e.kind = "signal";
   e.source = "Window, Strain Gauge Technology (1992)";
   e.parameters = {{"time", "s", 20, 2, 1e3, false, "Record a longer run."}};
   for (const double tau : {3.0, 10.0, 40.0, 200.0}) e.starts.push_back(Eigen::VectorXd::Constant(1, tau));

@@ -19,6 +19,7 @@ Effect gauge_lowpass() {
   e.id = "gauge-lowpass";
   e.summary = "amplifier or anti-alias filter in the gauge channel";
   e.equation = "y_f'' + 2 zeta w_c y_f' + w_c^2 y_f = w_c^2 y, w_c = 2 pi f_c, gauge = y_f";
+  e.kind = "signal";
   e.source = "Butterworth, Wireless Engineer 7 (1930) 536";
   e.parameters = {{"cutoff", "Hz", 30, 0.5, 1e4, false, near_cutoff}, {"damping_ratio", "1", 1 / std::numbers::sqrt2, 0.2, 20, false, near_cutoff, Role::damping}};
   for (double f = 3; f < 400; f *= 1.5) e.starts.push_back(Eigen::Vector2d(f, 1 / std::numbers::sqrt2));

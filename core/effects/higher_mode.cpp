@@ -65,6 +65,7 @@ Effect higher_mode() {
   e.id = "higher-mode";
   e.summary = "structural modes that the model left out";
   e.equation = "x'' + 2 zeta omega_k x' + omega_k^2 x = phi_k^T F for every k";
+  e.kind = "stiffness";
   e.source = "seed, Eq. 3.3-3.4 and section 4.2.3";
   e.starts = {Eigen::VectorXd(0)};
   e.modal_parameters = {{"frequency", "Hz", 10, 1e-2, 1e6, false, excite},

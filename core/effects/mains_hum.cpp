@@ -31,6 +31,7 @@ Effect mains_hum() {
   e.id = "mains-hum";
   e.summary = "50/60 Hz pick-up and harmonics in the gauge channel";
   e.equation = "gauge += sum_k a_k cos 2 pi k f t + b_k sin 2 pi k f t, k = 1..3";
+  e.kind = "signal";
   e.source = "EN 50160 (power frequency)";
   e.parameters = {{"frequency", "Hz", 50, mains[0].first, mains[1].second, false, "Record a longer run."}};
   e.bands = {mains[0], mains[1]};

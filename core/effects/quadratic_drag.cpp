@@ -23,6 +23,7 @@ Effect quadratic_drag() {
   e.id = "quadratic-drag";
   e.summary = "drag of the moving section, force ~ velocity times its magnitude";
   e.equation = "F = -C_d (rho/2) c l |h'| h' on each strip";
+  e.kind = "damping";
   e.source = "Morison et al., Petroleum Transactions 189 (1950) 149";
   e.parameters = {{"coefficient", "1", 0, 0, 1e4, false, "Record free decays in the fluid from a small and from a large load."}};
   e.starts = {Eigen::VectorXd::Constant(1, 2.0)};

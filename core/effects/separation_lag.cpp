@@ -21,6 +21,7 @@ Effect separation_lag() {
   e.id = "separation-lag";
   e.summary = "slow loss of lift after the step at high onset angle";
   e.equation = "phi(s) -> phi(s) - D (1 - exp(-s/T_s))";
+  e.kind = "lift";
   e.source = "Leishman and Beddoes, J. American Helicopter Society 34(3) (1989) 3";
   e.parameters = {{"loss", "1", 0, -2, 2, false, steps}, {"time", "1", 10, 0.5, 300, false, steps}};
   for (const double s : {4.0, 10.0, 25.0}) e.starts.push_back(Eigen::Vector2d(0.1, s));

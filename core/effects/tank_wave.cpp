@@ -14,6 +14,7 @@ Effect tank_wave() {
   e.id = "tank-wave";
   e.summary = "decaying sloshing wave of the tank";
   e.equation = "F(t) = exp(-t/tau) (a cos 2 pi f t + b sin 2 pi f t) on the strips";
+  e.kind = "signal";
   e.source = "Faltinsen and Timokha, Sloshing (2009), chapter 1";
   e.parameters = {{"frequency", "Hz", 0.5, 0.05, 5, false, "Record a longer run in the fluid."}, {"decay_time", "s", 8, 0.3, 1e3, false, "Record a longer run in the fluid."}};
   for (const double tau : {3.0, 12.0})

@@ -10,6 +10,7 @@ Effect torsion_crosstalk() {
   e.id = "torsion-crosstalk";
   e.summary = "bridge not purely sensitive to the normal force";
   e.equation = "gauge += kappa M_t";
+  e.kind = "signal";
   e.source = "seed, section 1.2";
   e.parameters = {{"per_torque", "1/m", 0, -50, 50, false, "Record a run that excites torsion: a rapid step, or a pluck off the pitch axis."}};
   e.starts = {Eigen::VectorXd::Zero(1)};

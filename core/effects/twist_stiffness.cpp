@@ -26,6 +26,7 @@ Effect twist_stiffness() {
   e.id = "twist-stiffness";
   e.summary = "torsional stiffness that changes with amplitude";
   e.equation = "M = -k_3 ((theta + d)^3 - d^3)";
+  e.kind = "stiffness";
   e.source = "Lee, Price and Wong, Progress in Aerospace Sciences 35 (1999) 205";
   e.parameters = {{"coefficient", "N.m/rad^3", 0, -1e30, 1e30, false, large}, {"offset", "rad", 0, -1, 1, false, large}};
   e.starts = {Eigen::Vector2d(0, 0)};

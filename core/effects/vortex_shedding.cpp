@@ -22,6 +22,7 @@ Effect vortex_shedding() {
   e.id = "vortex-shedding";
   e.summary = "narrow-band force at a Strouhal frequency of flow speed and angle";
   e.equation = "F(t) = a cos 2 pi f t + b sin 2 pi f t on the strips, f = St U / (c sin alpha)";
+  e.kind = "lift";
   e.source = "Fage and Johansen, Proc. R. Soc. London A 116 (1927) 170";
   e.parameters = {{"strouhal", "1", 0.17, 0.05, 0.6, false, "Record a longer run in the stream at more than 8 degrees."}};
   e.starts = {Eigen::VectorXd::Constant(1, 0.17)};

@@ -10,6 +10,7 @@ Effect wagner_lag() {
   e.id = "wagner-lag";
   e.summary = "circulation that builds up differently from Wagner's function";
   e.equation = "phi(s) = 1 - a sum_k A_k exp(-r b_k s)";
+  e.kind = "lift";
   e.source = "R. T. Jones, NACA Report 681 (1940)";
   e.parameters = {{"rate", "1", 1, 0.05, 20, false, "Record a faster step of the angle."}, {"amplitude", "1", 1, 0, 1.9, false, "Record a faster step of the angle."}};
   e.starts = {Eigen::Vector2d(1, 1), Eigen::Vector2d(0.4, 1), Eigen::Vector2d(2.5, 1)};

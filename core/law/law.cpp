@@ -20,6 +20,8 @@ constexpr std::size_t most_parameters = most_law_parameters;
 constexpr std::pair<ActsOn, const char*> places[] = {{ActsOn::normal, "normal"}, {ActsOn::torsion, "torsion"}, {ActsOn::lift, "lift"}, {ActsOn::gauge, "gauge"}, {ActsOn::mount, "mount"}};
 constexpr std::array<const char*, symbol_count> symbol_units{"m", "m/s", "m/s^2", "rad", "rad/s", "rad", "rad/s", "rad", "m/s", "s", "1"};
 
+constexpr double unbounded = 1e30;
+
 bool is_letter(char c) { return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || c == '_'; }
 bool is_digit(char c) { return c >= '0' && c <= '9'; }
 
@@ -85,7 +87,6 @@ Parameter read_parameter(const TomlTable& table, const std::string& name) {
     const Measure m = measure_of(table, key);
     return unit_scale(m.unit, p.unit, table.place(key), table.full_name(key))(m.value);
   };
-  constexpr double unbounded = 1e30;
   p.start = in_si("start");
   p.lower = table.has("lower") ? in_si("lower") : -unbounded;
   p.upper = table.has("upper") ? in_si("upper") : unbounded;
@@ -164,10 +165,29 @@ void check_rest(const TomlTable& file, const Law& law) {
   if (law.memory) check(*law.memory, "memory");
 }
 
+/// A value as a law file has it, in the fewest digits that read back as the same number.
+std::string quantity(double value, const std::string& unit) { return unit == "1" ? fmt::format("{}", value) : fmt::format("\"{} {}\"", value, unit); }
+
 }  // namespace
 
 std::string to_string(ActsOn place) {
   return std::find_if(std::begin(places), std::end(places), [&](const auto& one) { return one.first == place; })->second;
+}
+
+std::string law_text(const Law& law) {
+  std::string text = fmt::format("unrig_law = 1\nname = \"{}\"\nacts_on = \"{}\"\nforce = \"{}\"\n", law.name, to_string(law.acts_on), law.force_text);
+  if (law.memory) text += fmt::format("memory = \"{}\"\n", law.memory_text);
+  if (!law.parameters.empty()) text += "[parameters]\n";
+  for (const Parameter& p : law.parameters) {
+    text += fmt::format("{} = {{ start = {}", p.name, quantity(p.start, p.unit));
+    if (p.lower > -unbounded) text += ", lower = " + quantity(p.lower, p.unit);
+    if (p.upper < unbounded) text += ", upper = " + quantity(p.upper, p.unit);
+    text += " }\n";
+  }
+  std::string scales;
+  for (std::size_t s = 0; s < symbol_count; ++s)
+    if (law.scales[s] != 1) scales += fmt::format("{} = {}\n", symbol_names[s], quantity(law.scales[s], symbol_units[s]));
+  return scales.empty() ? text : text + "[scales]\n" + scales;
 }
 
 std::string Law::id() const {

@@ -49,5 +49,7 @@ struct Law {
 Law read_law(const std::string& path);
 /// The same from its text.
 Law parse_law(const std::string& text, const std::string& file);
+/// A law file of these formulas, parameters and scales; what parse_law reads from it says the same as `law`.
+std::string law_text(const Law& law);
 
 }  // namespace unrig

@@ -294,6 +294,7 @@ std::shared_ptr<const LawEffect> law_effect(Law read) {
   e.summary = law.name;
   e.equation = fmt::format("{} = {}{}", symbol_of(law.acts_on), law.force_text, law.memory ? ", z' = " + law.memory_text : "");
   std::replace_if(e.equation.begin(), e.equation.end(), [](char c) { return c == '\n' || c == '\r' || c == '\t'; }, ' ');
+  e.kind = law.kind();
   e.source = law.file;
   e.parameters = law.parameters;
   Eigen::VectorXd start(static_cast<Index>(e.parameters.size()));

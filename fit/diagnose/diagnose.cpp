@@ -9,6 +9,7 @@
 #include <fmt/format.h>
 
 #include "core/effects/effect.h"
+#include "core/law/law_effect.h"
 #include "core/files/error.h"
 #include "core/rig/fingerprint.h"
 #include "core/numerics/in_parallel.h"
@@ -16,6 +17,7 @@
 #include "fit/diagnose/heldout.h"
 #include "fit/diagnose/rig_description.h"
 #include "fit/diagnose/selection.h"
+#include "fit/laws/law_search.h"
 #include "fit/search/effect_search.h"
 #include "fit/fit_description.h"
 #include "fit/givens/inexact_rig.h"
@@ -177,13 +179,14 @@ double probability_of(const std::string& id, const std::vector<Candidate>& ranki
 }
 
 /// The effects of the best set, with their parameters.
-std::vector<MissingEffect> effects_of(const Explanation& found, const Diagnosis& d) {
+std::vector<MissingEffect> effects_of(const Explanation& found, const Rig& rig, const Diagnosis& d) {
   const Trial& best = found.best;
   std::vector<MissingEffect> set;
   for (const std::string& id : best.effects) {
     if (is_idle(best.arrival.joint, id)) continue;
-    const Effect& e = effect(id);
-    MissingEffect m{id, probability_of(id, d.ranking), e.equation, e.source, {}};
+    const Effect& e = effect(rig, id);
+    MissingEffect m{id, probability_of(id, d.ranking), e.equation, is_law_id(id) ? std::string() : e.source, {}};
+    m.kind = e.kind;
     for (const FittedParameter& p : found.fit.parameters)
       if (p.name.starts_with(id + ".")) m.parameters.push_back(p);
     set.push_back(m);
@@ -323,6 +326,46 @@ bool weigh(const DiagnoseProblem& problem, const Setting& files, const Trial& ba
   return true;
 }
 
+/// What a search for laws came to.
+struct Laws {
+  std::vector<Trial> tried;  ///< the best first, which is what was found
+  Reach reach;
+};
+
+bool leaves_something(const Trial& t) { return what_remains(t).found; }
+
+/// The law of what no effect explains: from the fit with nothing missing or, where that finds none, beside the best set. Where one is named and its evidence beats what was `found`, it is in `found`.
+std::optional<Laws> look_for_laws(const DiagnoseProblem& problem, FitProblem& fit_problem, const Setting& files, const Trial& baseline, Selection& selection, Explanation& found) {
+  const bool named = !found.best.effects.empty() && naming_of(found.best, baseline, found.clean(), found.predicts) == Naming::named;
+  std::vector<const Trial*> bases;
+  if (!named) bases.push_back(&baseline);
+  if (!found.best.effects.empty()) bases.push_back(&found.best);
+  for (const Trial* base : bases) {
+    LawSearch search(fit_problem, *base, leaves_something);
+    Laws laws{search.search(), search.reach()};
+    for (const Trial& t : laws.tried) selection.add({t.effects, t.reduced_chi2(), bic_difference(t, baseline), 0, 0});
+    if (laws.tried.empty()) continue;
+    Explanation with = look_at(problem, files, baseline, files, laws.tried.front(), 0);
+    if (naming_of(with.best, baseline, with.clean(), with.predicts) != Naming::named || !(bic_difference(with.best, found.best) < -decisive)) continue;
+    found = std::move(with);
+    return laws;
+  }
+  fit_problem.rig.laws.clear();
+  return std::nullopt;
+}
+
+/// Laws among `set`, told as such; the rig keeps only those at work.
+void tell_laws(FitProblem& fit_problem, const Laws& laws, const Explanation& found, std::vector<MissingEffect>& set, Diagnosis& d) {
+  const std::vector<Rival> others = rivals(fit_problem, laws.tried, leaves_something, decisive);
+  for (MissingEffect& m : set)
+    if (is_law_id(m.effect)) {
+      m.law = found_law(fit_problem.rig, m.effect, found.fit, laws.reach);
+      if (m.effect == found.best.effects.back()) m.law->rivals = others;
+    }
+  std::erase_if(fit_problem.rig.laws, [&](const auto& law) { return std::find(found.best.effects.begin(), found.best.effects.end(), law->id) == found.best.effects.end(); });
+  d.laws = fit_problem.rig.laws;
+}
+
 Diagnosis diagnose_in_order(const DiagnoseProblem& problem, bool numbers_known) {
   if (!numbers_known && states_errors(problem.rig, problem.runs)) return diagnose_inexact(problem);
   const auto begin = std::chrono::steady_clock::now();
@@ -379,6 +422,8 @@ Diagnosis diagnose_in_order(const DiagnoseProblem& problem, bool numbers_known) 
   if (!problem.verdict_only) d.maps = residual_maps(baseline.arrival.joint, d.mismatch.runs);
   Explanation found = look_at(problem, files, baseline, files, std::move(best_set), 0);
   const bool described = description && weigh(problem, files, baseline, *description, std::move(beside), *selection, found);
+  std::optional<Laws> laws;
+  if (problem.laws && !problem.verdict_only && problem.effects.empty() && d.mismatch.found && !described && !found.explains()) laws = look_for_laws(problem, fit_problem, files, baseline, *selection, found);
   const Trial& best = found.best;
   d.ranking = selection->ranking();
   d.remaining = found.remaining;
@@ -401,7 +446,8 @@ Diagnosis diagnose_in_order(const DiagnoseProblem& problem, bool numbers_known) 
     if (d.naming == Naming::named) name_equivalent(found, described, selection->tried(), problem.verdict_only, d);
     else d.removed_by_closest = 1 - best.excess() / baseline.excess();
     std::vector<MissingEffect>& set = d.naming == Naming::named ? d.missing : d.closest;
-    for (MissingEffect& m : effects_of(found, d)) set.push_back(std::move(m));
+    for (MissingEffect& m : effects_of(found, fit_problem.rig, d)) set.push_back(std::move(m));
+    if (laws) tell_laws(fit_problem, *laws, found, set, d);
   }
   d.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
   return d;

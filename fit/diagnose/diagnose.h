@@ -1,6 +1,8 @@
 #pragma once
 #include <array>
 #include <functional>
+#include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -9,7 +11,8 @@
 #include "core/model/wagner.h"
 #include "fit/diagnose/maps.h"
 #include "fit/diagnose/mismatch.h"
-#include "fit/diagnose/missing_force.h"
+#include "fit/laws/found_law.h"
+#include "fit/force/missing_force.h"
 #include "fit/diagnose/separating.h"
 #include "fit/fit.h"
 
@@ -28,6 +31,7 @@ struct DiagnoseProblem {
   Wagner circulation = Wagner::within_1e4;
   bool verdict_only = false;          ///< neither maps nor predictions, nor descriptions of the fits, nor the missing force
   std::vector<std::string> effects;   ///< candidates; empty: all that can act in these runs
+  bool laws = true;                   ///< where no effect explains the runs and no candidates are named, their law is looked for (fit/laws/law_search.h)
   std::function<void(const std::string&)> progress;
 };
 
@@ -51,6 +55,8 @@ struct MissingEffect {
   std::string equation, source;
   std::vector<FittedParameter> parameters;
   std::string advice = {};  ///< what to do about it; of the rig's description only
+  std::string kind = {};    ///< Effect::kind; empty of the rig's description
+  std::optional<FoundLaw> law = {};  ///< of an effect on no list
 };
 
 /// What is missing is an exact rig file or head of a run: no effect, so that core/effects does not know it. Its parameters are the numbers that moved most, `start` what the file says of them.
@@ -84,6 +90,7 @@ struct Diagnosis {
   std::vector<Candidate> ranking;
   FitResult before;   ///< with nothing missing, all runs at their full weight, as `unrig fit` has it
   FitResult after;
+  std::vector<std::shared_ptr<const Effect>> laws;  ///< that are at work in `after`
   std::vector<MissingForce> missing_force;  ///< where something is unexplained: what would explain it
   double seconds = 0;
 };
@@ -95,6 +102,7 @@ struct Diagnosis {
 ///    own variance and with as many samples as the remaining colour leaves independent.
 /// 4. While a mismatch remains a further effect is tried beside the best; an effect that others made superfluous is taken away again.
 /// 5. Where the rig's description leaves nothing, effects are named only if their evidence beats it decisively. Where it leaves something and effects do so too, effects are tried beside it.
+/// 6. Where something remains all the same, its law is looked for (fit/laws/law_search.h), from the fit with nothing missing, else beside the best set.
 /// An effect is named only where no significant mismatch remains beside the set it belongs to, or nearly all of the excess is gone (which is not enough for signals
 /// with amplitudes of their own in every run), and where runs that were not fitted are predicted better with it than without: those held out or, where there are
 /// none, each fitted run from the others. Otherwise the mismatch is unexplained, and the force is given that would explain it.

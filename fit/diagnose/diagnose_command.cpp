@@ -49,6 +49,8 @@ int diagnose_command(int argc, char** argv) {
   app.add_option("runs", runs, "run files (CSV) of this rig, in any number")->required();
   app.add_option("--heldout", heldout, "run that is not fitted but predicted (repeatable)")->allow_extra_args(false);
   app.add_option("--effects", ids, "candidates, separated by commas; without it, all that can act in these runs")->delimiter(',')->allow_extra_args(false);
+  bool no_law = false;
+  app.add_flag("--no-law", no_law, "does not look for a law where no effect explains the runs");
   app.add_option_function<int>("--threads", use_threads, "how many threads to work in; without it, as many as the machine has")->check(CLI::Range(1, 256));
   app.add_option("--fit", fit_output, "writes the winning fit too (fit.json), for simulate and correct");
   app.add_option("-o,--output", output, "result (JSON)")->required();
@@ -70,6 +72,7 @@ int diagnose_command(int argc, char** argv) {
   for (const std::string& path : runs) problem.runs.push_back(read_run(path));
   for (const std::string& path : heldout) problem.heldout.push_back(read_run(path));
   check_recordings(problem);
+  problem.laws = !no_law;
   problem.effects = effects_of_option("--effects", ids);
   refuse_idle("--effects", problem.effects, problem.rig, problem.runs);
   std::vector<Run> all = problem.runs;
@@ -86,7 +89,7 @@ int diagnose_command(int argc, char** argv) {
   const bool rig_is_off = std::any_of(diagnosis.missing.begin(), diagnosis.missing.end(), [](const MissingEffect& m) { return m.effect == rig_description_id; });
   if (rig_is_off && !fit_output.empty()) warn(fit_output + ": the fit is of the rig as its file has it, which the diagnosis holds for off. State how well its numbers are known, and fit anew");
   const auto whole = [](const std::string& text) { return [&text](const TextSink& sink) { sink(text); }; };
-  const std::string told = to_json(diagnosis), fitted = fit_output.empty() ? std::string() : to_json(diagnosis.after);
+  const std::string told = to_json(diagnosis), fitted = fit_output.empty() ? std::string() : to_json(diagnosis.after, diagnosis.laws);
   write_together({{output, whole(told)}, {fit_output, whole(fitted)}});
   fmt::print("{}", report(diagnosis));
   fmt::print("    {:.1f} s\n", diagnosis.seconds);

@@ -111,15 +111,38 @@ std::string verdict_on_rig(const MissingEffect& rig, const std::vector<std::stri
   return fmt::format("Missing is {}, and an exact rig file: {}{}.", fmt::join(others, " and "), number, more);
 }
 
+std::string formula(const Law& law) { return fmt::format("{}{}", law.force_text, law.memory_text.empty() ? "" : ", z' = " + law.memory_text); }
+
 std::string verdict(const Diagnosis& d) {
   if (!d.mismatch.found) return "Nothing is missing: " + d.mismatch.summary + ".";
   if (d.missing.empty())
     return d.search == SearchOutcome::failed ? "There is a mismatch, and the search for what removes it failed in part: unexplained." : "There is a mismatch that no known effect removes: unexplained.";
   std::vector<std::string> ids;
   for (const MissingEffect& m : d.missing)
-    if (!is_rig_description(m)) ids.push_back(m.effect);
+    if (!is_rig_description(m)) ids.push_back(m.law ? fmt::format("a law on no list, {} ({}: {})", m.law->law.name, m.law->law.acts_on == ActsOn::torsion ? "moment" : "force", formula(m.law->law)) : m.effect);
   if (const auto rig = std::find_if(d.missing.begin(), d.missing.end(), is_rig_description); rig != d.missing.end()) return verdict_on_rig(*rig, ids);
   return fmt::format("Missing is {}{}.", fmt::join(ids, " and "), d.unexplained ? "; something remains unexplained" : "");
+}
+
+/// A law is told by its formula, whatever the name that the program gave it.
+std::string told_id(const MissingEffect& m) { return m.law ? "law" : m.effect; }
+
+ordered_json law_json(const FoundLaw& found) {
+  ordered_json law = {{"name", found.law.name}, {"acts_on", to_string(found.law.acts_on)}, {"class", found.law.name.starts_with("curve") ? "curve" : found.law.kind()}, {"force", found.law.force_text}};
+  if (!found.law.memory_text.empty()) law["memory"] = found.law.memory_text;
+  law["text"] = found.law.text;
+  law["learnt_on"] = ordered_json::object();
+  for (const auto& [symbol, range] : found.learnt_on) law["learnt_on"][symbol] = {range.lowest, range.highest, range.unit};
+  law["rivals"] = ordered_json::array();
+  for (const Rival& r : found.rivals) {
+    ordered_json rival = {{"effects", r.effects}, {"force", r.force}};
+    if (!r.memory.empty()) rival["memory"] = r.memory;
+    if (!r.text.empty()) rival["text"] = r.text;
+    rival["distance_sigma"] = number(r.distance);
+    rival["log_odds"] = number(r.log_odds);
+    law["rivals"].push_back(rival);
+  }
+  return law;
 }
 
 ordered_json effects_json(const std::vector<MissingEffect>& effects) {
@@ -132,16 +155,26 @@ ordered_json effects_json(const std::vector<MissingEffect>& effects) {
       if (!p.run.empty()) one["run"] = p.run;
       parameters.push_back(one);
     }
-    list.push_back({{"effect", m.effect}, {"probability", number(m.probability)}, {"equation", m.equation}, {"source", m.source}, {"parameters", parameters}});
+    list.push_back({{"effect", told_id(m)}, {"probability", number(m.probability)}, {"equation", m.equation}, {"source", m.source}, {"parameters", parameters}});
+    if (!m.kind.empty()) list.back()["class"] = m.law && m.law->law.name.starts_with("curve") ? "curve" : m.kind;
+    if (m.law) list.back()["law"] = law_json(*m.law);
     if (!m.advice.empty()) list.back()["advice"] = m.advice;
   }
   return list;
 }
 
+std::string law_words(const FoundLaw& found) {
+  std::string text;
+  for (const auto& [symbol, range] : found.learnt_on) text += fmt::format("    learnt where {} is from {:.3g} to {:.3g} {}; beyond, it is a guess\n", symbol, range.lowest, range.highest, range.unit);
+  for (const Rival& r : found.rivals) text += fmt::format("    these runs cannot refute {}: {:.1f} standard deviations away, odds 1 to {:.3g}\n", r.force + (r.memory.empty() ? "" : ", z' = " + r.memory), r.distance, std::exp(r.log_odds));
+  if (found.rivals.empty()) text += "    of the forms that were tried these runs refute every other\n";
+  return text;
+}
+
 std::string effects_text(const std::vector<MissingEffect>& effects) {
   std::string text;
   for (const MissingEffect& m : effects) {
-    text += fmt::format("[[{}]] probability {:.4f} among the sets tried\n    {}{}\n", m.effect, m.probability, m.equation, m.source.empty() ? "" : "    (" + m.source + ")");
+    text += fmt::format("[[{}]] probability {:.4f} among the sets tried\n    {}{}\n", told_id(m), m.probability, m.equation, m.source.empty() ? "" : "    (" + m.source + ")");
     for (const FittedParameter& p : m.parameters) {
       if (is_rig_description(m)) {
         text += "    " + moved_number(p) + "\n";
@@ -150,6 +183,7 @@ std::string effects_text(const std::vector<MissingEffect>& effects) {
       const std::string error = p.std_error > 0 ? fmt::format(" +/- {:.2g}", p.std_error) : std::string();
       text += fmt::format("    {} = {:.6g}{} {}{}{}\n", p.name, p.value, error, p.unit, p.run.empty() ? "" : " (" + base_name(p.run) + ")", p.identified ? "" : " (not identified)");
     }
+    if (m.law) text += law_words(*m.law);
     if (!m.advice.empty()) text += "    " + m.advice + ".\n";
   }
   return text;
@@ -207,7 +241,7 @@ std::string to_json(const Diagnosis& d) {
                              {"price_of_ignorance", shifts},
                              {"ranking", ranking},
                              {"missing_force", forces},
-                             {"fit", ordered_json::parse(to_json(d.after))}};
+                             {"fit", ordered_json::parse(to_json(d.after, d.laws))}};
   return json.dump(2) + "\n";
 }
 

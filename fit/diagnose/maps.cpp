@@ -4,7 +4,7 @@
 #include <cmath>
 
 #include "core/numerics/spectrum.h"
-#include "fit/diagnose/run_states.h"
+#include "fit/force/run_states.h"
 #include "fit/likelihood/standardised_residual.h"
 
 namespace unrig {

@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "fit/diagnose/run_states.h"
+#include "fit/force/run_states.h"
 #include "fit/likelihood/joint_problem.h"
 
 namespace unrig {

@@ -10,6 +10,7 @@
 #include <fmt/ranges.h>
 
 #include "core/effects/effect.h"
+#include "core/law/law_effect.h"
 #include "core/numerics/in_parallel.h"
 #include "fit/search/decays_first.h"
 #include "fit/diagnose/mismatch.h"
@@ -72,7 +73,7 @@ bool distinct(const Trial& trial) {
   double longest = 0;
   for (const RunResidual& run : joint.runs()) longest = std::max(longest, run.run().dt * static_cast<double>(run.run().samples()));
   return std::all_of(trial.effects.begin(), trial.effects.end(), [&](const std::string& id) {
-    const Effect& e = effect(id);
+    const Effect& e = effect(joint.model().rig(), id);
     return !e.distinct || e.distinct(joint.model(), joint.theta(0), longest);
   });
 }
@@ -114,7 +115,7 @@ Trial in_finer_steps(Trial trial) {
 
 SearchOutcome search_of(const Trial& trial, const Trial& base) {
   if (trial.ruled_out) return SearchOutcome::ruled_out;
-  return !effect(trial.effects.back()).parameters.empty() && deviance_difference(trial, base) > decisive ? SearchOutcome::failed : SearchOutcome::complete;
+  return !effect(trial.arrival.joint.model().rig(), trial.effects.back()).parameters.empty() && deviance_difference(trial, base) > decisive ? SearchOutcome::failed : SearchOutcome::complete;
 }
 
 Mismatch what_remains(const Trial& trial) {

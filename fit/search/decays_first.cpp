@@ -79,6 +79,12 @@ class GrowingTrust {
   double left_as_trusted() const { return level_ >= trusted_levels ? left_ / samples_ : INFINITY; }
 
   const JointProblem& joint() const { return joint_; }
+  /// States of the decays along their trajectories, per run.
+  std::vector<MatrixXd> states() const {
+    std::vector<MatrixXd> all(joint_.runs().size());
+    for (std::size_t d = 0; d < decays_.size(); ++d) all[decays_[d]] = smoothers_[d].states();
+    return all;
+  }
   /// c of the decays, in their order.
   const std::vector<VectorXd>& linear() const { return linear_; }
 
@@ -329,6 +335,16 @@ bool takes_small_steps(const JointProblem& joint) {
 
 bool has_decays(const JointProblem& joint) { return std::any_of(joint.runs().begin(), joint.runs().end(), is_decay); }
 
+BesideUnknownForces beside_unknown_forces(const JointProblem& joint) {
+  JointProblem start = joint;
+  back_to_the_rig(start, 2);
+  for (RunResidual& run : start.runs())
+    if (is_decay(run)) run.temper(1);
+  GrowingTrust trust(std::move(start));
+  trust.fit(1);
+  return {trust.joint(), trust.states()};
+}
+
 double left_as_trusted(const JointProblem& joint) {
   JointProblem held = joint;
   for (Unknown& u : held.unknowns()) u.held = true;
@@ -339,7 +355,7 @@ double left_as_trusted(const JointProblem& joint) {
   return trust.left_as_trusted();
 }
 
-DecaysLeft fit_decays(JointProblem& joint, const std::string& id) {
+DecaysLeft fit_decays(JointProblem& joint, const std::string& id, bool from_here) {
   JointProblem start = joint;
   back_to_the_rig(start, 2);
   for (RunResidual& run : start.runs())
@@ -387,7 +403,7 @@ DecaysLeft fit_decays(JointProblem& joint, const std::string& id) {
   const std::unique_ptr<GrowingTrust> first = trust(1, GrowingTrust::all_levels);
   JointProblem found = joint;
   const double left = follow_exactly(found, *first);
-  if (left > followed && size != 0) {
+  if (left > followed && size != 0 && !from_here) {
     const std::unique_ptr<GrowingTrust> other = better_of_other_sizes(GrowingTrust::all_levels);
     if (const double others_left = other->better_than(*first) ? follow_exactly(joint, *other) : INFINITY; others_left < left) return {others_left, true};
   }

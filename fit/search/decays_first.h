@@ -24,7 +24,16 @@ struct DecaysLeft {
 /// a smaller and a larger size. A large trajectory that crosses the corners of a law for seconds tells errors of theta from each other as little as chance does, and has least chi-squares
 /// everywhere: of the ways to a law that takes small steps the one that leaves least is kept, and where it leaves one of the decays above its noise, the law is asked what it leaves
 /// when it is trusted to within some per cent; that holds where it is the noise, or where the model itself leaves more than half as much again.
-DecaysLeft fit_decays(JointProblem& joint, const std::string& id);
+/// `from_here`: the start is an estimate, other sizes are not tried.
+DecaysLeft fit_decays(JointProblem& joint, const std::string& id, bool from_here = false);
+
+/// Free decays beside unknown accelerations of every coordinate.
+struct BesideUnknownForces {
+  JointProblem joint;                   ///< parameters at which the decays ask for the least of them
+  std::vector<Eigen::MatrixXd> states;  ///< per run: those of the model that the readings ask for, n x samples; empty of runs whose motion is estimated
+};
+/// From the parameters of `joint` or, where they have gone astray, from the rig's first values.
+BesideUnknownForces beside_unknown_forces(const JointProblem& joint);
 
 /// What laws that are trusted to within 2.5 % of the force that is missed leave of the decays: J over the samples, at the joint problem's theta.
 double left_as_trusted(const JointProblem& joint);

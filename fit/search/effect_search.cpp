@@ -296,7 +296,7 @@ double left_of_decays(const Trial& trial) {
 
 bool decays_decide(const Trial& trial) { return takes_small_steps(trial.arrival.joint) && has_decays(trial.arrival.joint); }
 
-bool fit_decays_first(Trial& trial, const Trial& base) {
+bool fit_decays_first(Trial& trial, const Trial& base, bool from_here) {
   JointProblem& joint = trial.arrival.joint;
   constexpr double worth_it = 0.5;
   const double before = left_of_decays(base), followed = takes_small_steps(joint) ? 1.15 : 2;  // corners are seen where a fit with everything free loses its way
@@ -304,7 +304,7 @@ bool fit_decays_first(Trial& trial, const Trial& base) {
     measure(trial);
     return !has_decays(joint) || !takes_small_steps(joint);  // a gap would show
   }
-  trial.decays = fit_decays(joint, trial.effects.back());
+  trial.decays = fit_decays(joint, trial.effects.back(), from_here);
   const bool helps = trial.decays.chi2 - 1 < worth_it * (before - 1);
   measure(trial);
   if (helps)
@@ -342,15 +342,16 @@ void judge_decays(Trial& trial) {
   measure(trial);
 }
 
+void follow_further(Trial& trial, double least) {
+  if (decays_decide(trial)) return follow_motions(trial);
+  fit_fully(trial, 2);
+  if (trial.reduced_chi2() < least) fit_fully(trial, 6);
+}
+
 bool follow_nonlinear(Trial& trial, const Trial& base, double least) {
   trial.ruled_out = !fit_decays_first(trial, base);
   if (trial.ruled_out) return false;
-  if (decays_decide(trial)) {
-    follow_motions(trial);
-    return true;
-  }
-  fit_fully(trial, 2);
-  if (trial.reduced_chi2() < least) fit_fully(trial, 6);
+  follow_further(trial, least);
   return true;
 }
 

@@ -67,8 +67,11 @@ bool decays_decide(const Trial& trial);
 void judge_decays(Trial& trial);
 
 /// Of a prepared trial whose last effect is nonlinear: theta from the free decays alone (fit/search/decays_first.h), where there are any that
-/// `base` does not follow. False where the effect leaves more than half of the excess that `base` leaves of them: the other runs are not worth the search.
-bool fit_decays_first(Trial& trial, const Trial& base);
+/// `base` does not follow. False where the effect leaves more than half of the excess that `base` leaves of them: the other runs are not worth the search. `from_here`: its start is an estimate.
+bool fit_decays_first(Trial& trial, const Trial& base, bool from_here = false);
+
+/// Fits everything, in full where that leaves less than `least`, once fit_decays_first has told theta.
+void follow_further(Trial& trial, double least);
 
 /// Fits a prepared trial whose last effect is nonlinear: by the free decays first, then everything, in full where that leaves less than `least`. False where the free decays speak against it.
 bool follow_nonlinear(Trial& trial, const Trial& base, double least);

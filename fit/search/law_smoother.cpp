@@ -293,4 +293,10 @@ VectorXd LawSmoother::linear() const {
   return c;
 }
 
+MatrixXd LawSmoother::states() const {
+  MatrixXd at_samples(states_, readings_);
+  for (Index k = 0; k < readings_; ++k) at_samples.col(k) = state_.col(k * parts_);
+  return at_samples;
+}
+
 }  // namespace unrig

@@ -46,6 +46,8 @@ class LawSmoother {
   double cost(const Eigen::VectorXd& sigma) const;
   /// R.m.s. of each disturbance along it.
   Eigen::VectorXd disturbance() const;
+  /// States of the model at its samples, n x samples.
+  Eigen::MatrixXd states() const;
   /// c of the run (RunResidual) that belongs to it.
   Eigen::VectorXd linear() const;
 

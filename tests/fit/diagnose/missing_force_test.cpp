@@ -1,4 +1,4 @@
-#include "fit/diagnose/missing_force.h"
+#include "fit/force/missing_force.h"
 
 #include <gtest/gtest.h>
 

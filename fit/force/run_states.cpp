@@ -1,4 +1,4 @@
-#include "fit/diagnose/run_states.h"
+#include "fit/force/run_states.h"
 
 #include <algorithm>
 #include <cmath>

@@ -1,4 +1,4 @@
-#include "fit/diagnose/missing_force.h"
+#include "fit/force/missing_force.h"
 
 #include <Eigen/LU>
 #include <cmath>
@@ -111,7 +111,44 @@ double least_between(double low, double high, Function f) {
 
 }  // namespace
 
-MissingForce estimate_force(const LinearSystem& system, double dt, const VectorXd& residual, double noise) {
+ForceFilter::ForceFilter(const LinearSystem& system, double dt, double roughness, double noise) {
+  const Walk walk = walk_of(system, dt);
+  const Filter filter = filter_for(walk, roughness * std::sqrt(dt), noise);
+  const ExactStep step = exact_step(system, dt);
+  forward_ = walk.F;
+  observe_ = walk.H;
+  gain_ = filter.gain;
+  variance_ = filter.variance;
+  input0_ = VectorXd::Zero(forward_.rows());
+  input1_ = input0_;
+  input0_.head(system.states()) = step.input0.value.col(0);
+  input1_.head(system.states()) = step.input1.value.col(0);
+  direct_ = system.D.value(0, 0);
+}
+
+VectorXd ForceFilter::innovations(const VectorXd& readings) const { return unrig::innovations({forward_, {}, observe_}, {{}, gain_, variance_}, readings); }
+
+MatrixXd ForceFilter::innovations_of_forces(const MatrixXd& forces, const VectorXd& counts) const {
+  const Index n = states(), known = forces.cols(), samples = forces.rows();
+  MatrixXd state = MatrixXd::Zero(n, known + n), next(n, known + n), out(known + n, samples);
+  state.rightCols(n).setIdentity();
+  const MatrixXd per_sample = forces.transpose();
+  RowVectorXd e(known + n);
+  for (Index k = 0; k < samples; ++k) {
+    e.noalias() = observe_ * state;
+    e.head(known) += direct_ * per_sample.col(k).transpose();
+    if (counts[k] == 0) e.setZero();
+    out.col(k) = e.transpose();
+    state.noalias() -= gain_ * e;
+    next.noalias() = forward_ * state;
+    next.leftCols(known).noalias() += input0_ * per_sample.col(k).transpose();
+    if (k + 1 < samples) next.leftCols(known).noalias() += input1_ * per_sample.col(k + 1).transpose();
+    state.swap(next);
+  }
+  return out.transpose();
+}
+
+MissingForce estimate_force(const LinearSystem& system, double dt, const VectorXd& residual, double noise, MatrixXd* smoothed) {
   const Walk walk = walk_of(system, dt);
   const Index n = walk.F.rows(), last = n - 1;
   // From a force that would change by a thousandth of the noise over the record to one that may change by all of its range at every sample.
@@ -135,7 +172,9 @@ MissingForce estimate_force(const LinearSystem& system, double dt, const VectorX
     else
       later = (walk.F.transpose() * later).eval();
     force.value[k] = states(last, k) + filter.P.row(last).dot(later);
+    if (smoothed) states.col(k) += filter.P * later;
   }
+  if (smoothed) *smoothed = states.topRows(last);
   // Its information, doubled to the steady state: L = H^T H / variance + carried^T L carried.
   MatrixXd L = walk.H.transpose() * walk.H / filter.variance, power = carried;
   for (int i = 0; i < 40; ++i) {

@@ -30,7 +30,28 @@ struct MissingForce {
 /// One for every run of a beam rig with a gauge; none for a rig that is known as modes only and has no force in its recording.
 std::vector<MissingForce> missing_forces(const JointProblem& joint);
 
-/// The same for one residual [N], of a system with one input and one output; the noise's standard deviation in N. Samples that are not finite are skipped.
-MissingForce estimate_force(const LinearSystem& system, double dt, const Eigen::VectorXd& residual, double noise);
+/// The same for one residual [N], of a system with one input and one output; the noise's standard deviation in N. Samples that are not finite are skipped. `states`, where it is given, gets
+/// those of the system that go with the force, n x samples.
+MissingForce estimate_force(const LinearSystem& system, double dt, const Eigen::VectorXd& residual, double noise, Eigen::MatrixXd* states = nullptr);
+
+/// The Kalman filter of that random walk in its steady state, for readings that are linear in something: it is linear in them.
+class ForceFilter {
+ public:
+  /// `roughness` [N/sqrt(s)] as MissingForce has it.
+  ForceFilter(const LinearSystem& system, double dt, double roughness, double noise);
+
+  double variance() const { return variance_; }  ///< of the innovations of what it is made for
+  Eigen::Index states() const { return forward_.rows(); }  ///< of system and force
+  /// Innovations of these readings; 0 where a sample is not finite.
+  Eigen::VectorXd innovations(const Eigen::VectorXd& readings) const;
+  /// Innovations of what known forces (samples x count, linear between samples) and, in the last columns, unit initial states make the system read. Where `counts` is 0 there is no sample.
+  Eigen::MatrixXd innovations_of_forces(const Eigen::MatrixXd& forces, const Eigen::VectorXd& counts) const;
+
+ private:
+  Eigen::MatrixXd forward_;
+  Eigen::RowVectorXd observe_;
+  Eigen::VectorXd gain_, input0_, input1_;
+  double direct_ = 0, variance_ = 0;
+};
 
 }  // namespace unrig

@@ -1,0 +1,36 @@
+#pragma once
+#include <memory>
+#include <vector>
+
+#include "core/effects/effect.h"
+#include "core/law/law.h"
+#include "fit/search/decays_first.h"
+
+namespace unrig {
+
+/// A formula of the dictionary, put to the sizes of these runs.
+struct Form {
+  Law law;                             ///< its scales are what the runs reach, so that coefficients are forces
+  std::vector<Eigen::VectorXd> starts; ///< of its parameters: a small force of either sign, and what shapes it may have
+};
+
+/// How far the runs of a fit take the states that a law may look at: largest absolute values.
+struct Reach {
+  double x = 0, v = 0;               ///< m, m/s; of the first normal mode (run_states)
+  double twist = 0, twist_rate = 0;  ///< rad, rad/s
+  double alpha = 0;                  ///< rad, effective angle of attack, that of the shaft taken for it
+  double seconds = 0;                ///< of the longest run
+  double force = 0;                  ///< N, or N/kg^0.5 of a rig of modes: what holds x, stiffness times x
+  double moment = 0;                 ///< N m, what holds the twist
+};
+Reach reach_of(const BesideUnknownForces& beside);
+
+/// Formulas that a missing force may have (correct/manual/laws.md): powers of displacement, velocity and twist with a free exponent, even ones too; springs with a gap, on one side and on both; saturation, a sine, a
+/// pull across two gaps; damping that grows or falls with amplitude; dry friction, with Stribeck's decrease; hysteresis of Bouc and Wen (Dahl's with b = 0), a Maxwell element; stiffness and damping that change with time,
+/// angle or speed; lift that bends; last, curves without a formula of their own. Those that nothing in these runs would move are left out.
+std::vector<Form> dictionary(const Rig& rig, const Reach& reach);
+
+/// The form as an effect of a rig, with its starts.
+std::shared_ptr<const Effect> as_effect(const Form& form);
+
+}  // namespace unrig

@@ -1,0 +1,39 @@
+#pragma once
+#include <functional>
+#include <vector>
+
+#include "fit/fit.h"
+#include "fit/laws/dictionary.h"
+#include "fit/search/effect_search.h"
+
+namespace unrig {
+
+/// The law of a force that no effect on the list explains.
+///
+/// 1. States that the free decays ask for, beside unknown accelerations (beside_unknown_forces).
+/// 2. Every form of the dictionary, its force on these states sent through the rig onto the readings (screen).
+/// 3. The forms that explain most are fitted with all their parameters free: to the free decays first, then to all runs. Effects of the list that are tried only where they are named are fitted too where a form of
+///    their kind is. All are held against each other by BIC.
+/// 4. Where the best leaves something, a second law is looked for beside it.
+///
+/// Source: M. Alvarez, D. Luengo and N. Lawrence, Latent force models, AISTATS (2009); S. L. Brunton, J. L. Proctor and J. N. Kutz, PNAS 113 (2016) 3932, whose candidates are regressed on derivatives, here on readings.
+class LawSearch {
+ public:
+  /// `problem` lives as long as what is found, and its rig gets the laws that are tried. `leaves_something`: whether a fit does.
+  LawSearch(FitProblem& problem, const Trial& base, std::function<bool(const Trial&)> leaves_something);
+
+  /// All sets that were fitted in full, `base` with one law more or two, the best first; empty where no form explains anything.
+  std::vector<Trial> search();
+  /// How far the free decays took the states, beside unknown accelerations.
+  const Reach& reach() const { return reach_; }
+
+ private:
+  std::vector<Trial> one_more(const Trial& base);
+
+  FitProblem& problem_;
+  const Trial& base_;
+  std::function<bool(const Trial&)> leaves_something_;
+  Reach reach_;
+};
+
+}  // namespace unrig
