@@ -13,6 +13,7 @@ namespace {
 
 using Eigen::Index;
 using Eigen::MatrixXd;
+using Eigen::RowVectorXd;
 
 DualMatrix columns_of(const DualMatrix& a, const std::vector<Index>& columns) {
   DualMatrix picked(MatrixXd(a.rows(), static_cast<Index>(columns.size())), a.parameters());
@@ -124,6 +125,21 @@ DualMatrix port(const LinearSystem& system, Index column, double amount) {
   MatrixXd direction = MatrixXd::Zero(system.B.cols(), 1);
   direction(column, 0) = amount;
   return DualMatrix(direction, system.A.parameters());
+}
+
+RowVectorXd angle_of_attack(const LinearSystem& system, const AeroelasticModel& model, double speed, Index strip) {
+  const Rig& rig = model.rig();
+  const double behind_axis = (0.5 - rig.axis()) * rig.semichord();
+  const auto strips = static_cast<Index>(rig.submerged.size());
+  RowVectorXd sum = RowVectorXd::Zero(system.states());
+  const Index first = strip < 0 ? 0 : strip, last = strip < 0 ? strips : strip + 1;
+  for (Index s = first; s < last; ++s) {
+    const Index element = rig.submerged[static_cast<std::size_t>(s)] - 1;
+    const RowVectorXd twist = model.basis().twist.row(element), normal = model.basis().normal.row(element);
+    sum += displacement_of(system, twist) + rate_of(system, behind_axis * twist - normal) / speed;
+    if (system.motion >= 0) sum += RowVectorXd::Unit(system.states(), system.motion) + behind_axis / speed * RowVectorXd::Unit(system.states(), system.motion + 1);
+  }
+  return sum / static_cast<double>(last - first);
 }
 
 Eigen::RowVectorXd displacement_of(const LinearSystem& system, const Eigen::RowVectorXd& shape) {

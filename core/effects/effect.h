@@ -115,6 +115,9 @@ Eigen::Index append_memory(LinearSystem& system, const DualMatrix& direction, co
 
 /// `amount` on input column `column`, as a direction for append_feedback.
 DualMatrix port(const LinearSystem& system, Eigen::Index column, double amount);
+/// What reads the effective angle of attack at three-quarter chord of a strip, w / U (AeroelasticModel), as a deviation from that before the motion; `strip` -1: the mean of all. Of a beam in a stream.
+Eigen::RowVectorXd angle_of_attack(const LinearSystem& system, const AeroelasticModel& model, double speed, Eigen::Index strip);
+
 /// What reads the displacement, or the rate, of a point that moves by `shape` times the coordinates.
 Eigen::RowVectorXd displacement_of(const LinearSystem& system, const Eigen::RowVectorXd& shape);
 Eigen::RowVectorXd rate_of(const LinearSystem& system, const Eigen::RowVectorXd& shape);

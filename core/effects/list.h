@@ -11,6 +11,7 @@ Effect freeplay();
 Effect quadratic_drag();
 Effect wagner_lag();
 Effect separation_lag();
+Effect lift_curve();
 Effect vortex_shedding();
 Effect tank_wave();
 Effect carriage_vibration();

@@ -14,6 +14,7 @@ const std::vector<Effect>& effects() {
       quadratic_drag(),
       wagner_lag(),
       separation_lag(),
+      lift_curve(),
       vortex_shedding(),
       tank_wave(),
       carriage_vibration(),

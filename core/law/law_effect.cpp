@@ -133,7 +133,7 @@ class LawAtWork {
     set(Symbol::twist_rate, 0, rate_of(system_, twist));
     set(Symbol::theta, c_.conditions.onset_angle, system_.motion >= 0 ? state(system_.motion) : RowVectorXd());
     set(Symbol::theta_rate, 0, system_.motion >= 0 ? state(system_.motion + 1) : RowVectorXd());
-    if (U > 0) set(Symbol::alpha, c_.conditions.onset_angle, angle_of_attack(strip));
+    if (U > 0) set(Symbol::alpha, c_.conditions.onset_angle, angle_of_attack(system_, c_.model, U, strip));
     return view;
   }
 
@@ -146,20 +146,6 @@ class LawAtWork {
     return basis.torsion_modes > 0 ? RowVectorXd(basis.twist(c_.model.rig().submerged.back() - 1, basis.normal_modes) * RowVectorXd::Unit(system_.coordinates, basis.normal_modes)) : none;
   }
   RowVectorXd strip_twist(Index strip) const { return c_.model.basis().twist.row(c_.model.rig().submerged[static_cast<std::size_t>(strip)] - 1); }
-
-  /// w / U at three-quarter chord (AeroelasticModel), of a strip or the mean of all.
-  RowVectorXd angle_of_attack(Index strip) const {
-    const Rig& rig = c_.model.rig();
-    const double behind_axis = (0.5 - rig.axis()) * rig.semichord(), U = c_.conditions.speed;
-    RowVectorXd sum = RowVectorXd::Zero(system_.states());
-    const Index first = strip < 0 ? 0 : strip, last = strip < 0 ? c_.ports.strips : strip + 1;
-    for (Index s = first; s < last; ++s) {
-      const RowVectorXd twist = strip_twist(s), normal = c_.model.basis().normal.row(rig.submerged[static_cast<std::size_t>(s)] - 1);
-      sum += displacement_of(system_, twist) + rate_of(system_, behind_axis * twist - normal) / U;
-      if (system_.motion >= 0) sum += state(system_.motion) + behind_axis / U * state(system_.motion + 1);
-    }
-    return sum / static_cast<double>(last - first);
-  }
 
   Feedback feedback_of(const Expression& expression, const View& view, bool counts_from_rest) const {
     Seen seen{std::make_shared<const Expression>(expression), view.at_rest, {}, law_.parameters.size(), counts_from_rest};

@@ -7,7 +7,6 @@
 
 #include "core/law/law_effect.h"
 #include "core/numerics/in_parallel.h"
-#include "core/propagate/exact_step.h"
 #include "fit/force/missing_force.h"
 
 namespace unrig {
@@ -143,27 +142,16 @@ struct Said {
   std::vector<Level> levels;
 };
 
-constexpr std::array<double, 5> densities{1, 0.3, 0.1, 0.03, 0.01};  // times the one that the readings ask for where no law is known
+constexpr std::array<double, 5> densities{1, 0.1, 0.01, 1e-3, 1e-4};  // times the one that the readings ask for where no law is known
 
 std::optional<Said> ask(const RunResidual& run, const VectorXd& theta, ActsOn place, const std::vector<Form>& forms, const std::vector<Column>& columns, const MatrixXd& states) {
   const RunResidual::Prediction p = run.predict(theta);
-  if (!p.output.allFinite() || p.initial_state.size() == 0) return std::nullopt;
+  if (!p.output.allFinite()) return std::nullopt;
   const Port port = port_of(run, theta, place);
   const double dt = run.run().dt;
   const Index samples = states.cols(), n = port.system.states();
   if (port.system.B.value.norm() == 0) return std::nullopt;
-  // The linear rig from where the fit begins, and what the readings say beyond it.
-  const ExactStep step = exact_step(port.system, dt);
-  MatrixXd linear(n, samples);
-  VectorXd state = VectorXd::Zero(n);
-  const Index known = std::min(p.initial_state.size(), port.system.free_states());
-  state.head(known) = p.initial_state.head(known);
-  for (Index k = 0; k < samples; ++k) {
-    linear.col(k) = state;
-    state = (step.transition.value * state).eval();
-  }
-  VectorXd left = run.run().channel(run.channels().front()).value.head(samples) - (port.system.C.value.row(0) * linear).transpose(), counts = VectorXd::Ones(samples);
-  left.array() -= p.offset[0];
+  VectorXd left = (run.run().channel(run.channels().front()).value - p.output.col(0)).head(samples), counts = VectorXd::Ones(samples);
   for (Index k = 0; k < samples; ++k)
     if (!(run.channel_weight(0)[k] > 0) || !std::isfinite(left[k])) left[k] = std::nan(""), counts[k] = 0;
   const MissingForce force = estimate_force(port.system, dt, left, run.noise(0));
