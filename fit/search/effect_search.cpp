@@ -11,6 +11,7 @@
 #include "fit/fit.h"
 #include "fit/fit_description.h"
 #include "fit/search/own_parameters.h"
+#include "fit/likelihood/readings_noise.h"
 #include "fit/likelihood/standardised_residual.h"
 
 namespace unrig {
@@ -122,6 +123,7 @@ void anneal(Arrival& arrival, int rounds) {
     options.precision = has_corners ? precision_at_corners(arrival.joint) : 0.5;  // candidates differ by more than half a standard error, or cannot be told apart
     options.most_evaluations = 12;
     solve(arrival, options);
+    for (std::size_t r = 0; r < arrival.joint.runs().size(); ++r) settle_wandering(arrival.joint.runs()[r], arrival.joint.theta(r));
     if (!temper(arrival.joint)) return;
   }
 }
@@ -217,7 +219,8 @@ double deviance_difference(const Trial& a, const Trial& b) {
   const Trial& better = better_of(a, b);
   double difference = 0;
   for (std::size_t r = 0; r < a.variance.size(); ++r) {
-    difference += better.samples[r] * std::log(a.variance[r] / b.variance[r]);
+    const double noise_of_a = a.arrival.joint.runs()[r].sigma(0), noise_of_b = b.arrival.joint.runs()[r].sigma(0);  // of innovations, where a force wanders
+    difference += better.samples[r] * std::log(a.variance[r] * noise_of_a * noise_of_a / (b.variance[r] * noise_of_b * noise_of_b));
     // Of a run that is not explained the gauge is weighted down, and does not bend the motion.
     if (a.angle_samples[r] > 0 && std::max(a.variance[r], b.variance[r]) < explained) difference += b.angle_samples[r] * std::log(a.angle_variance[r] / b.angle_variance[r]);
   }
