@@ -10,6 +10,7 @@
 
 #include "core/effects/effect.h"
 #include "core/files/error.h"
+#include "core/law/law_effect.h"
 #include "core/rig/fingerprint.h"
 #include "core/numerics/in_parallel.h"
 #include "fit/search/decays_first.h"
@@ -118,12 +119,25 @@ struct Explanation {
   bool explains() const { return clean() && predicts; }
 };
 
+/// How much more than before, as a share, runs that were not fitted may be left with: nothing where an effect acts in one of them. Where none does, what chi-square of so many samples scatters by.
+double tolerated(const Setting& files, const std::vector<std::string>& effects) {
+  if (effects.empty()) return 0;
+  const FitProblem& problem = *files.problem;
+  double samples = 0;
+  for (const Run& run : files.heldout->empty() ? problem.runs : *files.heldout) {
+    samples += static_cast<double>(run.samples());
+    for (const std::string& id : effects)
+      if (effect(problem.rig, id).acts(problem.rig, conditions_of(run))) return 0;
+  }
+  return std::sqrt(2 / samples);
+}
+
 Explanation look_at(const DiagnoseProblem& problem, const Setting& files, const Trial& baseline, const Setting& setting, Trial best, double cost) {
   Explanation e{setting, std::move(best), cost, {}, {}, false};
   e.remaining = what_remains(e.best);
   if (!problem.verdict_only) e.unseen = predict_unseen(files, baseline.arrival, setting, e.best);
   const bool adds_nothing = e.best.effects.empty() && setting.problem == files.problem;
-  e.predicts = adds_nothing || power_over_noise(e.unseen, &ImprovedRun::rms_after) <= power_over_noise(e.unseen, &ImprovedRun::rms_before);
+  e.predicts = adds_nothing || power_over_noise(e.unseen, &ImprovedRun::rms_after) <= (1 + tolerated(files, e.best.effects)) * power_over_noise(e.unseen, &ImprovedRun::rms_before);
   return e;
 }
 

@@ -331,6 +331,8 @@ DualMatrix RunResidual::follow_partials(const VectorXd& theta, const VectorXd& l
     ExactStep step = exact_step(system, run_->dt);
     filter_output(system, step);
     std::shared_ptr<const WanderingForce> wandering = Linearised::wander(*this, theta, system, step, Partials::all);
+    for (Index j = 0; j < step.transition.parameters(); ++j)  // responses follow what moves the system
+      if (step.transition.depends_on(j) && !system.A.depends_on(j)) system.A.add_partial(j, MatrixXd::Zero(system.states(), system.states()));
     FreeResponse free(system, step, Partials::all);
     std::optional<rest_rows::SmoothResponse> smooth;
     if (shared_ || std::any_of(blocks.begin(), blocks.end(), [](const run_rows::Block& block) { return !block.moving && block.smooth_from < block.samples.last; })) smooth.emplace(free);
