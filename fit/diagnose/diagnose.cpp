@@ -269,9 +269,20 @@ double bic_in_its_noise(const Trial& trial) {
   return sum + trial.variables * std::log(samples);
 }
 
+/// The effects that are to be tried, without those that wander: in white noise such a force takes the colour of those runs in which it acts for its own, and of noise that explains all runs none is left for it.
+DiagnoseProblem without_wandering(DiagnoseProblem problem) {
+  if (problem.effects.empty())
+    for (const Effect& e : effects())
+      if (e.only_if_named.empty()) problem.effects.push_back(e.id);
+  std::erase_if(problem.effects, [&](const std::string& id) { return effect(problem.rig, id).noise != nullptr; });
+  return problem;
+}
+
 /// Whether effects in white noise explain all that a fit leaves, and better than noise of a colour does.
 bool effects_beat_noise(const DiagnoseProblem& problem, const FitProblem& fit_problem, const Trial& white, const Trial& coloured) {
-  Selection selection(problem, fit_problem, white);
+  const DiagnoseProblem steady = without_wandering(problem);
+  if (steady.effects.empty()) return false;
+  Selection selection(steady, fit_problem, white);
   const Trial best = selection.best_set();
   return !best.effects.empty() && !what_remains(best).found && bic_in_its_noise(best) - bic_in_its_noise(coloured) < -decisive;
 }
