@@ -237,6 +237,13 @@ double Trial::excess() const {
 
 namespace {
 
+/// Logarithm of what a run's variance is told in units of, a square of its noise; of its innovations where a force wanders.
+double log_unit(const RunResidual& run) {
+  double sum = 0;
+  for (std::size_t c = 0; c < run.channels().size(); ++c) sum += 2 * std::log(run.sigma(c));
+  return sum / static_cast<double>(run.channels().size());
+}
+
 const Trial& better_of(const Trial& a, const Trial& b) { return a.reduced_chi2() < b.reduced_chi2() ? a : b; }
 
 }  // namespace
@@ -245,8 +252,7 @@ double deviance_difference(const Trial& a, const Trial& b) {
   const Trial& better = better_of(a, b);
   double difference = 0;
   for (std::size_t r = 0; r < a.variance.size(); ++r) {
-    const double noise_of_a = a.arrival.joint.runs()[r].sigma(0), noise_of_b = b.arrival.joint.runs()[r].sigma(0);  // of innovations, where a force wanders
-    difference += better.samples[r] * std::log(a.variance[r] * noise_of_a * noise_of_a / (b.variance[r] * noise_of_b * noise_of_b));
+    difference += better.samples[r] * (std::log(a.variance[r] / b.variance[r]) + log_unit(a.arrival.joint.runs()[r]) - log_unit(b.arrival.joint.runs()[r]));
     // Of a run that is not explained the gauge is weighted down, and does not bend the motion.
     if (a.angle_samples[r] > 0 && std::max(a.variance[r], b.variance[r]) < explained) difference += b.angle_samples[r] * std::log(a.angle_variance[r] / b.angle_variance[r]);
   }
