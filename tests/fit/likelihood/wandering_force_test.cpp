@@ -5,6 +5,9 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/Cholesky>
+#include <Eigen/LU>
+#include <algorithm>
+#include <cmath>
 
 #include "core/effects/process_noise.h"
 #include "fit/likelihood/readings_noise.h"
@@ -87,6 +90,67 @@ TEST(WanderingForce, IsForeseenFromTheReadingsBefore) {
       EXPECT_LT((left.cwiseProduct(run.channel_weight(0)) - residual).norm(), 1e-8 * residual.norm());
     }
   }
+}
+
+/// Twelve seconds of a section at 25 degrees that sheds with one size and a phase that walks: a sine whose argument is summed up, on the strips.
+unrig::Run shedding_run(const AeroelasticModel& bare, double strouhal, double walk) {
+  constexpr Index n = 3000;
+  unrig::Run run = empty_run(RunKind::step, 0.6, dt);
+  add_channel(run, "alpha", VectorXd::Constant(n, 0.4363) + white_noise(n, 1.7e-4, 7), "rad");
+  Conditions ports = conditions_of(run);
+  ports.prescribed_pitch = false;
+  ports.force = ports.mount = ports.ports = true;
+  const LinearSystem system = bare.system(ports, bare.start_values(), {"gauge"});
+  const auto strips = static_cast<Index>(bare.rig().submerged.size());
+  const double frequency = strouhal * 0.6 / (2 * bare.rig().semichord() * std::sin(0.4363));
+  const VectorXd kicks = white_noise(n + 1, walk * std::sqrt(dt), 12);
+  MatrixXd input = MatrixXd::Zero(n + 1, system.B.cols());
+  double phase = 1;
+  for (Index k = 0; k <= n; ++k) {
+    input.row(k).segment(3, strips).setConstant(std::sin(phase) / static_cast<double>(strips));
+    phase += 2 * pi * frequency * dt + kicks[k];
+  }
+  const MatrixXd clean = drive(system, exact_step(system, dt), DualMatrix(MatrixXd::Zero(system.states(), 1)), n, {}, input, Partials::none).output;
+  add_channel(run, "gauge", clean.col(0) + white_noise(n, 0.03, 8));
+  return run;
+}
+
+TEST(WanderingForce, FindsTheLineOfAPhaseThatWalks) {
+  constexpr double strouhal = 0.19, walk = 0.8;
+  const auto bare = beam_model();
+  const AeroelasticModel model = bare->with_effects({"vortex-shedding"});
+  const unrig::Run run = shedding_run(*bare, strouhal, walk);
+  RunResidual residual(model, run, {});
+  const double white = residual.sigma(0);
+  VectorXd theta = model.start_values();
+  const Index first = model.index("vortex-shedding.strouhal");
+  MatrixXd information;
+  for (int i = 0; i < 40; ++i) {
+    settle_wandering(residual, theta);
+    const RunResidual::Evaluation e = residual.evaluate(theta, Partials::all);
+    const MatrixXd slope = e.jacobian.middleCols(first, 3);
+    information = slope.transpose() * slope;
+    const VectorXd step = information.ldlt().solve(slope.transpose() * e.residual);
+    for (Index k = 0; k < 3; ++k) {
+      const Parameter& p = model.parameters()[static_cast<std::size_t>(first + k)];
+      theta[first + k] = std::clamp(theta[first + k] - 0.5 * step[k], std::max(p.lower, 0.5 * theta[first + k]), std::min(p.upper, 2 * theta[first + k]));
+    }
+  }
+  const MatrixXd covariance = information.inverse();
+  EXPECT_NEAR(theta[first], strouhal, 4 * std::sqrt(covariance(0, 0)));
+  EXPECT_LT(std::sqrt(covariance(0, 0)), 0.1 * strouhal) << "a line that is found";
+  // One size and a phase that walks: the kicks have half of (size walk)^2 in each direction.
+  const double pressure = 0.5 * 998.2 * 0.6 * 0.6 * 2 * model.rig().semichord() * model.rig().strip_length * static_cast<double>(model.rig().submerged.size());
+  const double omega = 2 * pi * strouhal * 0.6 / (2 * model.rig().semichord() * std::sin(0.4363));
+  EXPECT_NEAR(theta[first + 2] / (walk / std::sqrt(2) / (pressure * std::sqrt(omega))), 1, 0.25);
+  EXPECT_NEAR(residual.solve(theta).chi2 / static_cast<double>(residual.degrees_of_freedom()), 1, 0.1);
+  EXPECT_LT(residual.sigma(0), 2 * white);
+  // A steady tone of any frequency nearby leaves much.
+  VectorXd tone = theta;
+  tone[first + 1] = tone[first + 2] = 0;
+  double least = INFINITY;
+  for (tone[first] = 0.8 * strouhal; tone[first] < 1.2 * strouhal; tone[first] += 0.01 * strouhal) least = std::min(least, RunResidual(model, run, {}).solve(tone).chi2);
+  EXPECT_GT(least, 20 * static_cast<double>(residual.degrees_of_freedom()));
 }
 
 /// Innovations and their variance are those of the whole covariance, once the filter's start is forgotten. Nothing of the filter is in it: every reading is a sum over all kicks before it.
