@@ -72,6 +72,9 @@ struct Effect {
   /// states from one theta to the next. AeroelasticModel::system holds `apply` to it.
   std::function<Eigen::Index(const AeroelasticModel&, const Conditions&)> states;
   std::function<void(LinearSystem& system, const EffectContext& context)> apply;
+  /// Of a signal that wanders: what white noise of unit density drives each of its states by, one column for each source, with partials (core/effects/process_noise.h). None: it goes on
+  /// as it began.
+  std::function<DualMatrix(const EffectContext& context)> noise = {};
   /// Parameters of a hidden one, drawn for `unrig trial`: from far below what noise lets one see to what nobody overlooks. `release`: load [N] that releases the
   /// plucks. Sizes of signals are drawn with their runs. Without it the start values are taken.
   std::function<Eigen::VectorXd(const AeroelasticModel& rig, double release, Random& random)> draw;

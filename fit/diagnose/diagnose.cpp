@@ -11,6 +11,7 @@
 #include "core/effects/effect.h"
 #include "core/law/law_effect.h"
 #include "core/files/error.h"
+#include "core/law/law_effect.h"
 #include "core/rig/fingerprint.h"
 #include "core/numerics/in_parallel.h"
 #include "fit/search/decays_first.h"
@@ -120,12 +121,25 @@ struct Explanation {
   bool explains() const { return clean() && predicts; }
 };
 
+/// How much more than before, as a share, runs that were not fitted may be left with: nothing where an effect acts in one of them. Where none does, what chi-square of so many samples scatters by.
+double tolerated(const Setting& files, const std::vector<std::string>& effects) {
+  if (effects.empty()) return 0;
+  const FitProblem& problem = *files.problem;
+  double samples = 0;
+  for (const Run& run : files.heldout->empty() ? problem.runs : *files.heldout) {
+    samples += static_cast<double>(run.samples());
+    for (const std::string& id : effects)
+      if (effect(problem.rig, id).acts(problem.rig, conditions_of(run))) return 0;
+  }
+  return std::sqrt(2 / samples);
+}
+
 Explanation look_at(const DiagnoseProblem& problem, const Setting& files, const Trial& baseline, const Setting& setting, Trial best, double cost) {
   Explanation e{setting, std::move(best), cost, {}, {}, false};
   e.remaining = what_remains(e.best);
   if (!problem.verdict_only) e.unseen = predict_unseen(files, baseline.arrival, setting, e.best);
   const bool adds_nothing = e.best.effects.empty() && setting.problem == files.problem;
-  e.predicts = adds_nothing || power_over_noise(e.unseen, &ImprovedRun::rms_after) <= power_over_noise(e.unseen, &ImprovedRun::rms_before);
+  e.predicts = adds_nothing || power_over_noise(e.unseen, &ImprovedRun::rms_after) <= (1 + tolerated(files, e.best.effects)) * power_over_noise(e.unseen, &ImprovedRun::rms_before);
   return e;
 }
 
@@ -258,9 +272,20 @@ double bic_in_its_noise(const Trial& trial) {
   return sum + trial.variables * std::log(samples);
 }
 
+/// The effects that are to be tried, without those that wander: in white noise such a force takes the colour of those runs in which it acts for its own, and of noise that explains all runs none is left for it.
+DiagnoseProblem without_wandering(DiagnoseProblem problem) {
+  if (problem.effects.empty())
+    for (const Effect& e : effects())
+      if (e.only_if_named.empty()) problem.effects.push_back(e.id);
+  std::erase_if(problem.effects, [&](const std::string& id) { return effect(problem.rig, id).noise != nullptr; });
+  return problem;
+}
+
 /// Whether effects in white noise explain all that a fit leaves, and better than noise of a colour does.
 bool effects_beat_noise(const DiagnoseProblem& problem, const FitProblem& fit_problem, const Trial& white, const Trial& coloured) {
-  Selection selection(problem, fit_problem, white);
+  const DiagnoseProblem steady = without_wandering(problem);
+  if (steady.effects.empty()) return false;
+  Selection selection(steady, fit_problem, white);
   const Trial best = selection.best_set();
   return !best.effects.empty() && !what_remains(best).found && bic_in_its_noise(best) - bic_in_its_noise(coloured) < -decisive;
 }

@@ -12,4 +12,7 @@ Eigen::MatrixXd standardised_readings(const RunResidual& run, const Eigen::Vecto
 /// Root mean square of what the noise of the measured inputs does to a channel [SI] at theta, its level as last settled (RunResidual::settle_noise); 0 where the inputs count as exact.
 double sigma_of_inputs(const RunResidual& run, const Eigen::VectorXd& theta, std::size_t channel);
 
+/// Of a run in which a force wanders: weights its innovations by the root of the variance that the model at theta gives them (fit/likelihood/wandering_force.h). Others are left alone.
+void settle_wandering(RunResidual& run, const Eigen::VectorXd& theta);
+
 }  // namespace unrig

@@ -28,15 +28,15 @@ MatrixXd Block::add_stretch(double weight, const Rotation& rotation) {
   return weight * rotation->triangle();
 }
 
-MatrixXd Block::join(const std::vector<MatrixXd>& spans, Index offset) {
+MatrixXd Block::join(const std::vector<MatrixXd>& spans, Index offset, Index offsets) {
   const Index states = start.rows();
-  MatrixXd span = stacked(spans, states + 1);
+  MatrixXd span = stacked(spans, states + offsets);
   if (spans.size() > 1) {
     joint_ = std::make_shared<const Householder>(std::move(span));
     span = joint_->triangle();
   }
   MatrixXd reach = span.leftCols(states) * start;
-  reach.col(offset) += span.col(states);
+  reach.middleCols(offset, offsets) += span.rightCols(offsets);
   return reach;
 }
 

@@ -37,6 +37,7 @@ RunResidual::Colours RunResidual::colours(const VectorXd& theta, const std::vect
 void RunResidual::set_colours(const VectorXd& theta, const Colours& colours) {
   const Prediction p = predict(theta);
   colour_ = colours;
+  shared_.reset();
   measured_ = (weight_.array() > 0).select(measured_, p.output);  // left-out readings have no innovation of their own
   for (std::size_t c = 0; c < channels_.size(); ++c) {
     if (!colour_[c]) continue;
@@ -76,7 +77,7 @@ void RunResidual::take_colour(const RunResidual& other) {
     if (whitened_.size() == 0) whitened_ = measured_;
     whitened_.col(static_cast<Index>(c)) = filters_.back().filtered(measured_.col(static_cast<Index>(c)));
   }
-  if (!filters_.empty()) shared_.reset();  // responses behind filters are this run's own
+  if (!filters_.empty()) shared_ = Linearised::only_noise_of(*this);  // responses behind filters are this run's own
   lay_out();
   guide_ = {};
   if (last_linear_.size() != before) return;

@@ -110,6 +110,9 @@ MatrixXd RunResidual::Linearised::white_slopes(const RunResidual& run, const Vec
 
 MatrixXd RunResidual::Linearised::standardised(const RunResidual& run, const VectorXd& theta, const MatrixXd& left) {
   const MatrixXd there = (run.weight_.array() > 0 && left.array().isFinite()).select(left, 0.0);
+  if (wanders(run))
+    if (const Solution solution = run.solve(theta); solution.model->wandering)
+      return (there.array() != 0).select(run.tempered_ * run.weight_.cwiseProduct(solution.model->innovations(run, solution.linear)), 0.0);
   if (const std::shared_ptr<const InputNoise> noise = noise_through(run, theta)) return MatrixXd(noise->whitened(there.reshaped())).reshaped(left.rows(), left.cols());
   MatrixXd white = there;
   for (std::size_t c = 0, f = 0; c < run.colour_.size(); ++c)

@@ -19,6 +19,7 @@ namespace unrig {
 
 class InputNoise;
 struct InputNoiseModel;
+class WanderingForce;
 
 namespace run_rows {
 
@@ -128,7 +129,8 @@ class Block {
   /// A stretch whose rows are few already.
   void add_smooth_stretch() { rotations_.emplace_back(); }
   /// Rotates the rows kept of all stretches together; returns what c does to them.
-  Eigen::MatrixXd join(const std::vector<Eigen::MatrixXd>& spans, Eigen::Index offset);
+  /// The columns behind those of the states are of so many offsets.
+  Eigen::MatrixXd join(const std::vector<Eigen::MatrixXd>& spans, Eigen::Index offset, Eigen::Index offsets = 1);
   /// All of that from `rows`.
   Eigen::MatrixXd rotate_rows(const Eigen::VectorXd& w, Eigen::Index offset);
 
@@ -173,11 +175,13 @@ struct RunResidual::SharedResponses {
     ExactStep step;
     FreeResponse free;
     std::optional<rest_rows::SmoothResponse> smooth;  ///< where some part of a rest is looked at so
+    std::shared_ptr<const WanderingForce> wandering;
   };
   std::mutex in_use;
   std::shared_ptr<const Rows> rows;
   std::shared_ptr<const Slopes> slopes;
   std::shared_ptr<const InputNoiseModel> input_noise;  ///< noise of the measured inputs (fit/likelihood/input_noise.h); none: they count as exact
+  std::vector<double> white;  ///< of a run with a wandering force: standard deviation of each channel's white noise, beside that of its innovations (RunResidual::sigma_); empty: the same
 };
 
 /// The model at one theta, without partials: its exact step, what the inputs alone do, where the unknown motion takes the states, and the rows
@@ -221,6 +225,27 @@ struct RunResidual::Linearised {
   /// A sensitivity whose residual lacks the readings still.
   void whiten(const RunResidual& run, const Eigen::VectorXd& theta, Sensitivity& sensitivity) const;
   static Eigen::MatrixXd standardised(const RunResidual& run, const Eigen::VectorXd& theta, const Eigen::MatrixXd& left);
+
+  // Where a force wanders (fit/likelihood/run_wandering.cpp): readings and model as innovations of its filter.
+  std::shared_ptr<const WanderingForce> wandering;  // none where none does, or where the model is nonlinear
+  /// The filter at theta of a system whose outputs have passed those of the noise; changes `step`.
+  static std::shared_ptr<const WanderingForce> wander(const RunResidual& run, const Eigen::VectorXd& theta, const LinearSystem& system, ExactStep& step, Partials partials);
+  static bool wanders(const RunResidual& run);
+  /// The readings that the rows stand for.
+  const Eigen::MatrixXd& readings(const RunResidual& run) const;
+  /// What c does by its offsets to some samples of a channel: a column for each offset, or, without a filter, for the channel's own.
+  Eigen::MatrixXd offset_columns(Eigen::Index channel, const Interval& samples) const;
+  /// The first offset that they belong to.
+  Eigen::Index offsets_from(const RunResidual& run, Eigen::Index channel) const { return run.first_offset_ + (wandering ? 0 : channel); }
+  /// What a linear model makes of an initial state and a motion: samples x channels, without offsets.
+  static Eigen::MatrixXd response(const RunResidual& run, const LinearSystem& system, const ExactStep& step, const Eigen::VectorXd& linear, const Motion& motion);
+  /// Innovations `at` some c, samples x channels.
+  Eigen::MatrixXd innovations(const RunResidual& run, const Eigen::VectorXd& at) const;
+  static void settle_wandering(RunResidual& run, const Eigen::VectorXd& theta);
+  static void keep_white(RunResidual& run, const RunResidual& other);
+  /// Of responses that are the run's own, the noise that they count in.
+  static std::shared_ptr<SharedResponses> only_noise_of(const RunResidual& run);
+
   /// Solves the rows [c | right] of the whole record for c. `tangents`: d y / d state at its start, per channel; `start`: d state / d c there.
   void settle_white(const RunResidual& run, const Eigen::MatrixXd& start, std::vector<Eigen::MatrixXd> tangents, const Eigen::MatrixXd& right);
 };

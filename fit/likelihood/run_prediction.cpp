@@ -2,6 +2,7 @@
 
 #include "core/propagate/nonlinear_response.h"
 #include "fit/likelihood/run_linearised.h"
+#include "fit/likelihood/wandering_force.h"
 
 // What RunResidual predicts of a whole record, and how that follows theta and the noise.
 
@@ -31,22 +32,31 @@ RunResidual::Prediction RunResidual::predict(const VectorXd& theta) const {
     return p;
   }
   // The readings themselves, not behind the filters.
-  LinearSystem system = filters_.empty() ? lin.system : searched_system(theta);
-  const ExactStep step = filters_.empty() ? lin.step : exact_step(system, run_->dt);
-  DualMatrix state(MatrixXd::Zero(system.states(), 1));
-  state.value.col(0) = initial_state(p.linear, system.states());
-  const FreeResponse free(system, step, Partials::none);
-  for (const MotionBasis::Phase& phase : phases_) {
-    const Interval& s = phase.samples;
-    const Response response = phase.moving ? drive(system, step, state, s.length(), p.motion.jerk.segment(s.first, s.length()), {}, Partials::none)
-                                             : free.from(state, s.length());
-    state = response.end;
-    if (phase.moving && s.last < run_->samples()) stand_still(state.value, system.motion, Eigen::RowVectorXd::Constant(1, p.motion.angle[s.last] + arrival_angle(system)));
-    p.output.middleRows(s.first, s.length()) = response.output;
-  }
+  const bool as_they_are = filters_.empty() && !lin.wandering;
+  LinearSystem system = as_they_are ? lin.system : searched_system(theta);
+  const ExactStep step = as_they_are ? lin.step : exact_step(system, run_->dt);
+  p.output = Linearised::response(*this, system, step, p.linear, p.motion);
   if (lin.known.size() > 0) p.output += lin.known;
   p.output.rowwise() += p.offset.transpose();
+  if (lin.wandering) p.output += lin.wandering->foreseen(lin.innovations(*this, p.linear), system.C.value);
   return p;
+}
+
+MatrixXd RunResidual::Linearised::response(const RunResidual& run, const LinearSystem& system, const ExactStep& step, const VectorXd& linear, const Motion& motion) {
+  const Index samples = run.run_->samples();
+  MatrixXd output(samples, system.C.rows());
+  DualMatrix state(MatrixXd::Zero(system.states(), 1));
+  state.value.col(0) = run.initial_state(linear, system.states());
+  const FreeResponse free(system, step, Partials::none);
+  for (const MotionBasis::Phase& phase : run.phases_) {
+    const Interval& s = phase.samples;
+    const Response response = phase.moving ? drive(system, step, state, s.length(), motion.jerk.segment(s.first, s.length()), {}, Partials::none)
+                                             : free.from(state, s.length());
+    state = response.end;
+    if (phase.moving && s.last < samples) stand_still(state.value, system.motion, Eigen::RowVectorXd::Constant(1, motion.angle[s.last] + run.arrival_angle(system)));
+    output.middleRows(s.first, s.length()) = response.output;
+  }
+  return output;
 }
 
 /// Adds d prediction / d c of one block, times what c does, to the rows of its samples.
@@ -57,7 +67,8 @@ void RunResidual::add_prediction_slope(const Linearised& lin, const run_rows::Bl
     own += block.rows * linear_slope;
     return;
   }
-  own.rowwise() += linear_slope.row(first_offset_ + block.channel);
+  const MatrixXd offsets = lin.offset_columns(block.channel, s);
+  own += offsets * linear_slope.middleRows(lin.offsets_from(*this, block.channel), offsets.cols());
   MatrixXd state = block.start.leftCols(unknowns_) * linear_slope;
   if (block.rows.size() > 0) {
     own += block.rows * state;
@@ -94,7 +105,7 @@ RunResidual::Sensitivity RunResidual::sensitivity(const VectorXd& theta) const {
   if (coloured) lin.whiten(*this, theta, result);
   for (Index c = 0; c < measured_.cols() && !coloured; ++c) {
     Sensitivity::PerChannel& channel = result.channels[static_cast<std::size_t>(c)];
-    channel.residual = weight_.col(c).cwiseProduct(channel.residual + readings().col(c));
+    channel.residual = weight_.col(c).cwiseProduct(channel.residual + lin.readings(*this).col(c));
     channel.slope.array().colwise() *= weight_.col(c).array();
   }
   if (angle_offset_ >= 0) {

@@ -271,6 +271,7 @@ void RunResidual::keep_noise_of(const RunResidual& other) {
   sigma_ = other.sigma_;
   weight_ = other.weight_;
   Linearised::keep_input_noise(*this, other);
+  Linearised::keep_white(*this, other);
   take_colour(other);
   angle_sigma_ = other.angle_sigma_;
   angle_ = other.angle_;

@@ -4,6 +4,7 @@
 
 #include "core/propagate/nonlinear_response.h"
 #include "fit/likelihood/run_linearised.h"
+#include "fit/likelihood/wandering_force.h"
 
 // The arithmetic behind RunResidual: rows of the linear unknowns, their elimination, and what theta does beside them.
 
@@ -48,10 +49,11 @@ std::shared_ptr<RunResidual::Linearised> RunResidual::linearise(const VectorXd& 
     for (DualMatrix* m : {&lin->system.A, &lin->system.B, &lin->system.C, &lin->system.D}) m->partial.clear();
     lin->step = step_to_follow(lin->system, run_->dt);
     filter_output(lin->system, lin->step);
+    lin->wandering = Linearised::wander(*this, theta, lin->system, lin->step, Partials::none);
   }
   if (!lin->system.feedback.empty()) return lin;
   prepare_linear(*lin);
-  if (shared_ && !known) shared_->rows = std::make_shared<const SharedResponses::Rows>(SharedResponses::Rows{theta, samples_of_free_response(), lin->system, lin->step, lin->free, lin->leap});
+  if (shared_ && !known && !lin->wandering) shared_->rows = std::make_shared<const SharedResponses::Rows>(SharedResponses::Rows{theta, samples_of_free_response(), lin->system, lin->step, lin->free, lin->leap});
   return lin;
 }
 
@@ -65,7 +67,7 @@ void RunResidual::prepare_linear(Linearised& lin) const {
     for (MatrixXd& rows : free_response_rows(lin.system, lin.step, samples_of_free_response())) lin.free.emplace_back(std::move(rows));
     lin.leap = power(lin.step.transition.value, rest_rows::stretch_samples);
   }
-  lin.polynomials = inputs_.cols() == 0;
+  lin.polynomials = inputs_.cols() == 0 && !lin.wandering;
   if (motion_.unknowns() > 0) {
     lin.spline = spline_states(lin.step, longest_phase(true) + 1);
     lin.spline_summed = lin.spline;
@@ -152,18 +154,19 @@ MatrixXd RunResidual::reach_at_rest(const Linearised& lin, run_rows::Block& bloc
     // The broken stretch at the end of the rest.
     if (smooth_since.size() > 0) since = power(lin.step.transition.value, first - block.samples.first);
     const auto w = weight_.col(block.channel).segment(first, stretch.length());
-    MatrixXd span(stretch.length(), n + 1);
-    if (free.rotation && stretch.length() == rest_rows::stretch_samples && w[0] > 0 && (w.array() == w[0]).all()) {
+    const MatrixXd offsets = lin.offset_columns(block.channel, stretch);
+    MatrixXd span(stretch.length(), n + offsets.cols());
+    if (!lin.wandering && free.rotation && stretch.length() == rest_rows::stretch_samples && w[0] > 0 && (w.array() == w[0]).all()) {
       span = block.add_stretch(w[0], free.rotation);
     } else {
-      span << w.asDiagonal() * free.rows.topRows(stretch.length()), w;
+      span << w.asDiagonal() * free.rows.topRows(stretch.length()), w.asDiagonal() * offsets;
       span = block.add_stretch(std::move(span));
     }
     span.leftCols(n) *= since;
     spans.push_back(std::move(span));
     since = since * lin.leap;
   }
-  return block.join(spans, first_offset_ + block.channel);
+  return block.join(spans, lin.offsets_from(*this, block.channel), lin.wandering ? measured_.cols() : 1);
 }
 
 /// What c does to the weighted readings of a block in which the shaft moves: by the splines that begin in it, by the state at its start, and by the offset.
@@ -174,14 +177,15 @@ MatrixXd RunResidual::reach_in_motion(const Linearised& lin, run_rows::Block& bl
   const bool from_rest = block.start.isZero(0);
   const auto [first, count] = splines_in(s);
   const Index n = from_rest ? 0 : lin.system.states();
-  MatrixXd span(s.length(), count + n + 1);
-  span << motion_output_columns(lin, block.channel, s).middleCols(first, count), free.topLeftCorner(s.length(), n), VectorXd::Ones(s.length());
+  const MatrixXd offsets = lin.offset_columns(block.channel, s);
+  MatrixXd span(s.length(), count + n + offsets.cols());
+  span << motion_output_columns(lin, block.channel, s).middleCols(first, count), free.topLeftCorner(s.length(), n), offsets;
   span = w.asDiagonal() * span;
   if (span.rows() > 2 * span.cols()) span = block.add_stretch(std::move(span));
   MatrixXd reach = MatrixXd::Zero(span.rows(), block.start.cols());
   reach.middleCols(first, count) = span.leftCols(count);
   if (n > 0) reach += span.middleCols(count, n) * block.start;
-  reach.col(first_offset_ + block.channel) += span.rightCols(1);
+  reach.middleCols(lin.offsets_from(*this, block.channel), offsets.cols()) += span.rightCols(offsets.cols());
   return reach;
 }
 
@@ -198,7 +202,7 @@ run_rows::Rotated RunResidual::rotated_readings(const Linearised& lin, const run
       beside += readings.beside;
       continue;
     }
-    VectorXd y = readings().col(block.channel).segment(first, stretch.length());
+    VectorXd y = lin.readings(*this).col(block.channel).segment(first, stretch.length());
     if (lin.known.size() > 0) y -= lin.known.col(block.channel).segment(first, stretch.length());
     block.rotate(stretch, weight_.col(block.channel).segment(first, stretch.length()).cwiseProduct(y), rotated);
   }
@@ -300,6 +304,14 @@ MatrixXd slopes_and_prediction(const Response& response, const Response& known, 
   return m;
 }
 
+/// The offsets behind the filter of a wandering force, and what the parameters do to that: it takes from the readings what it adds here.
+void add_readings(const WanderingForce& wandering, const VectorXd& offset, Index channel, const Interval& s, MatrixXd& m) {
+  const Index parameters = m.cols() - 1;
+  m.col(parameters) += wandering.raised(channel).middleRows(s.first, s.length()) * offset;
+  for (Index j = 0; j < parameters; ++j)
+    if (const VectorXd slope = wandering.slope(j, channel, offset); slope.size() > 0) m.col(j) -= slope.segment(s.first, s.length());
+}
+
 }  // namespace
 
 /// Follows the model with its partials through all phases at fixed c, and hands [d y / d theta | y] of each channel to `take`, piece by piece. Stretches that are
@@ -318,16 +330,19 @@ DualMatrix RunResidual::follow_partials(const VectorXd& theta, const VectorXd& l
     }
     ExactStep step = exact_step(system, run_->dt);
     filter_output(system, step);
+    std::shared_ptr<const WanderingForce> wandering = Linearised::wander(*this, theta, system, step, Partials::all);
+    for (Index j = 0; j < step.transition.parameters(); ++j)  // responses follow what moves the system
+      if (step.transition.depends_on(j) && !system.A.depends_on(j)) system.A.add_partial(j, MatrixXd::Zero(system.states(), system.states()));
     FreeResponse free(system, step, Partials::all);
     std::optional<rest_rows::SmoothResponse> smooth;
     if (shared_ || std::any_of(blocks.begin(), blocks.end(), [](const run_rows::Block& block) { return !block.moving && block.smooth_from < block.samples.last; })) smooth.emplace(free);
-    at = std::make_shared<const SharedResponses::Slopes>(SharedResponses::Slopes{theta, differentiated_, std::move(system), std::move(step), std::move(free), std::move(smooth)});
-    if (shared_) {
+    at = std::make_shared<const SharedResponses::Slopes>(SharedResponses::Slopes{theta, differentiated_, std::move(system), std::move(step), std::move(free), std::move(smooth), std::move(wandering)});
+    if (shared_ && !at->wandering) {  // its innovations are those of this run's readings
       const std::lock_guard lock(shared_->in_use);
       shared_->slopes = at;
     }
   }
-  const auto& [its_theta, differentiated, system, step, free, smooth] = *at;
+  const auto& [its_theta, differentiated, system, step, free, smooth, wandering] = *at;
   const auto parameters = static_cast<Index>(model_->parameters().size());
   const Index channels = measured_.cols();
   Response known;
@@ -351,7 +366,8 @@ DualMatrix RunResidual::follow_partials(const VectorXd& theta, const VectorXd& l
       if (phase.moving && stretch.last < run_->samples()) stand_still(state.value, system.motion, RowVectorXd::Constant(1, motion.angle[stretch.last] + arrival_angle(system)));
       for (Index c = 0; c < channels; ++c) {
         MatrixXd m = slopes_and_prediction(response, known, stretch, c, parameters);
-        m.col(parameters) += linear[first_offset_ + c] * (is_smooth ? rest_rows::smooth_constant() : VectorXd::Ones(stretch.length()));
+        if (wandering) add_readings(*wandering, linear.segment(first_offset_, channels), c, stretch, m);
+        else m.col(parameters) += linear[first_offset_ + c] * (is_smooth ? rest_rows::smooth_constant() : VectorXd::Ones(stretch.length()));
         take(block + static_cast<std::size_t>(c), stretch, std::move(m));
       }
     }
@@ -402,7 +418,7 @@ RunResidual::Evaluation RunResidual::differentiate(const Solution& solution) con
       m.col(parameters) += readings.reading;
       beside += readings.beside;
     } else {
-      m.col(parameters) += readings().col(block.channel).segment(s.first, s.length());
+      m.col(parameters) += lin.readings(*this).col(block.channel).segment(s.first, s.length());
       m = weight_.col(block.channel).segment(s.first, s.length()).asDiagonal() * m;
     }
     block.rotate(s, std::move(m), rotated_blocks[b]);

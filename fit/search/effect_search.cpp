@@ -1,6 +1,7 @@
 #include "fit/search/effect_search.h"
 
 #include <Eigen/QR>
+#include <Eigen/SVD>
 #include <algorithm>
 #include <cmath>
 
@@ -11,6 +12,7 @@
 #include "fit/fit.h"
 #include "fit/fit_description.h"
 #include "fit/search/own_parameters.h"
+#include "fit/likelihood/readings_noise.h"
 #include "fit/likelihood/standardised_residual.h"
 
 namespace unrig {
@@ -35,7 +37,29 @@ struct LeftOfRun {
   double samples = 0;
   double independent = 0;  // of them, as the residual's colour says
   double angle_variance = 1, angle_samples = 0;
+  Index unknowns = 0;      // linear ones that its readings tell of
 };
+
+/// Linear unknowns of a run that count: of the states in which filters of the gauge start, those combinations that the readings know better than the swing of the reading itself tells. What a fast
+/// filter was in has died out before a sample shows it.
+Index told_unknowns(const RunResidual& run, const VectorXd& theta, const RunResidual::Prediction& p) {
+  const std::vector<Index> settling = run.model().system(run.conditions(), theta, run.channels()).settling;
+  std::vector<Index> order, own;
+  for (Index i = 0; i < run.linear_unknowns(); ++i) {
+    const Index state = i - run.motion().unknowns();
+    const bool is_state = state >= 0 && state < static_cast<Index>(run.free_states().size());
+    const bool is_filter = is_state && std::find(settling.begin(), settling.end(), run.free_states()[static_cast<std::size_t>(state)]) != settling.end();
+    (is_filter ? own : order).push_back(i);
+  }
+  if (own.empty()) return run.linear_unknowns();
+  const auto count = static_cast<Index>(own.size());
+  order.insert(order.end(), own.begin(), own.end());
+  const MatrixXd triangle = Eigen::HouseholderQR<MatrixXd>(p.linear_factor(Eigen::all, order)).matrixQR().triangularView<Eigen::Upper>();
+  const VectorXd reading = p.output.col(0).array() - p.output.col(0).mean();
+  const double swing = reading.norm() / std::sqrt(static_cast<double>(reading.size()));
+  const VectorXd told = swing * Eigen::JacobiSVD<MatrixXd>(triangle.bottomRightCorner(count, count)).singularValues();
+  return run.linear_unknowns() - count + (told.array() > 1).count();
+}
 
 /// A law that is missing bends the motion too, within the noise of the angle.
 void look_at_angle(const RunResidual& run, const RunResidual::Prediction& p, LeftOfRun& left) {
@@ -57,11 +81,13 @@ std::vector<LeftOfRun> left_of_runs(const JointProblem& joint) {
     const auto every_sample = static_cast<double>(run.run().samples());
     if (run.is_aside()) {
       all[r] = {1, every_sample, every_sample};
+      all[r].unknowns = run.linear_unknowns();
       return;
     }
     const RunResidual::Prediction p = run.predict(joint.theta(r));
     if (!p.output.allFinite()) {
       all[r] = {run_away, every_sample, every_sample};
+      all[r].unknowns = run.linear_unknowns();
       return;
     }
     double power = 0;
@@ -74,6 +100,7 @@ std::vector<LeftOfRun> left_of_runs(const JointProblem& joint) {
     }
     all[r].variance = power / all[r].samples;
     look_at_angle(run, p, all[r]);
+    all[r].unknowns = told_unknowns(run, joint.theta(r), p);
   });
   return all;
 }
@@ -122,6 +149,7 @@ void anneal(Arrival& arrival, int rounds) {
     options.precision = has_corners ? precision_at_corners(arrival.joint) : 0.5;  // candidates differ by more than half a standard error, or cannot be told apart
     options.most_evaluations = 12;
     solve(arrival, options);
+    for (std::size_t r = 0; r < arrival.joint.runs().size(); ++r) settle_wandering(arrival.joint.runs()[r], arrival.joint.theta(r));
     if (!temper(arrival.joint)) return;
   }
 }
@@ -140,7 +168,7 @@ void measure(Trial& trial) {
     trial.samples.push_back(left[r].independent);
     trial.angle_variance.push_back(left[r].angle_variance);
     trial.angle_samples.push_back(left[r].angle_samples);
-    trial.variables += static_cast<int>(joint.runs()[r].linear_unknowns());
+    trial.variables += static_cast<int>(left[r].unknowns);
   }
   for (const Unknown& u : joint.unknowns()) trial.variables += u.held ? 0 : 1;
 }
@@ -209,6 +237,13 @@ double Trial::excess() const {
 
 namespace {
 
+/// Logarithm of what a run's variance is told in units of, a square of its noise; of its innovations where a force wanders.
+double log_unit(const RunResidual& run) {
+  double sum = 0;
+  for (std::size_t c = 0; c < run.channels().size(); ++c) sum += 2 * std::log(run.sigma(c));
+  return sum / static_cast<double>(run.channels().size());
+}
+
 const Trial& better_of(const Trial& a, const Trial& b) { return a.reduced_chi2() < b.reduced_chi2() ? a : b; }
 
 }  // namespace
@@ -217,7 +252,7 @@ double deviance_difference(const Trial& a, const Trial& b) {
   const Trial& better = better_of(a, b);
   double difference = 0;
   for (std::size_t r = 0; r < a.variance.size(); ++r) {
-    difference += better.samples[r] * std::log(a.variance[r] / b.variance[r]);
+    difference += better.samples[r] * (std::log(a.variance[r] / b.variance[r]) + log_unit(a.arrival.joint.runs()[r]) - log_unit(b.arrival.joint.runs()[r]));
     // Of a run that is not explained the gauge is weighted down, and does not bend the motion.
     if (a.angle_samples[r] > 0 && std::max(a.variance[r], b.variance[r]) < explained) difference += b.angle_samples[r] * std::log(a.angle_variance[r] / b.angle_variance[r]);
   }

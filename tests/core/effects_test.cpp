@@ -10,6 +10,7 @@
 #include <numbers>
 #include <random>
 
+#include "core/effects/process_noise.h"
 #include "core/propagate/feedback_force.h"
 #include "core/rig/rig.h"
 #include "core/rig/structure.h"
@@ -132,6 +133,38 @@ TEST(Effects, PartialsOfEveryMatrixAgreeWithSlopes) {
         expect_slope(exact, slope, here.value, h, e->id + (rig.is_modal() ? " on modes: " : ": ") + name + " by " + model.parameters()[static_cast<std::size_t>(j)].name);
       }
   }
+}
+
+/// What drives the states of a signal that wanders: nothing else, and with its partials. There is one, and where it does not act there is no noise.
+TEST(Effects, NoiseDrivesTheStatesOfItsEffect) {
+  int wander = 0;
+  for (const auto& [e, rig] : cases()) {
+    // A signal before it, whose states are not its own.
+    const AeroelasticModel model = e->id == "gauge-drift" ? model_with(rig, e->id) : AeroelasticModel(model_with(rig, "gauge-drift")).with_effects({e->id});
+    const VectorXd theta = at_work(model, *e);
+    const Conditions conditions = conditions_for(rig);
+    const std::vector<std::string> channels{"gauge"};
+    const auto noise = [&](const VectorXd& there) { return process_noise(model, conditions, there, channels, model.system(conditions, there, channels)); };
+    const std::optional<DualMatrix> at = noise(theta);
+    ASSERT_EQ(at.has_value(), e->noise != nullptr) << e->id;
+    if (!at) continue;
+    ++wander;
+    const LinearSystem system = model.system(conditions, theta, channels);
+    const Index own = e->states(model, conditions);
+    ASSERT_EQ(at->rows(), system.states());
+    EXPECT_GT(at->value.bottomRows(own).norm(), 0) << e->id;
+    EXPECT_EQ(at->value.topRows(system.states() - own).norm(), 0) << e->id << ": the rig moves because the force does";
+    for (Index j = 0; j < theta.size(); ++j) {
+      const double h = step * (theta[j] == 0 ? 1 : std::abs(theta[j]));
+      const auto value = [&](double by) -> MatrixXd { return noise(theta + by * VectorXd::Unit(theta.size(), j))->value; };
+      const MatrixXd slope = slope_of(value, h), exact = at->depends_on(j) ? at->d(j) : MatrixXd::Zero(slope.rows(), slope.cols());
+      expect_slope(exact, slope, at->value, h, e->id + ": noise by " + model.parameters()[static_cast<std::size_t>(j)].name);
+    }
+    Conditions still = conditions;
+    still.speed = 0;
+    EXPECT_EQ(e->acts(rig, still), process_noise(model, still, theta, channels, model.system(still, theta, channels)).has_value()) << e->id;
+  }
+  EXPECT_GT(wander, 0);
 }
 
 /// Value of a law at (z, p), and its derivatives in each of both.

@@ -1,0 +1,158 @@
+#include "fit/likelihood/wandering_force.h"
+
+#include <Eigen/LU>
+#include <cmath>
+
+namespace unrig {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+namespace {
+
+/// States that noise on some reaches through the transition; the others follow none of them.
+std::vector<Index> reached_by(const MatrixXd& noise, const MatrixXd& transition) {
+  std::vector<char> reached(static_cast<std::size_t>(noise.rows()), 0);
+  std::vector<Index> waiting;
+  const auto reach = [&](Index i) {
+    if (reached[static_cast<std::size_t>(i)]) return;
+    reached[static_cast<std::size_t>(i)] = 1;
+    waiting.push_back(i);
+  };
+  for (Index i = 0; i < noise.rows(); ++i)
+    if (!noise.row(i).isZero(0)) reach(i);
+  while (!waiting.empty()) {
+    const Index j = waiting.back();
+    waiting.pop_back();
+    for (Index i = 0; i < transition.rows(); ++i)
+      if (transition(i, j) != 0) reach(i);
+  }
+  std::vector<Index> states;
+  for (Index i = 0; i < noise.rows(); ++i)
+    if (reached[static_cast<std::size_t>(i)]) states.push_back(i);
+  return states;
+}
+
+constexpr int most_doublings = 60;
+constexpr double rounding = 1e-14;
+
+/// P of the steady filter, by doubling (B. D. O. Anderson, Int. J. Control 28 (1978) 295).
+MatrixXd steady_covariance(const MatrixXd& transition, const MatrixXd& observe, const VectorXd& variance, const MatrixXd& process) {
+  const Index n = transition.rows();
+  MatrixXd a = transition.transpose(), g = observe.transpose() * variance.cwiseInverse().asDiagonal() * observe, h = process;
+  for (int i = 0; i < most_doublings; ++i) {
+    const Eigen::PartialPivLU<MatrixXd> w(MatrixXd::Identity(n, n) + g * h);
+    const MatrixXd wa = w.solve(a), wg = w.solve(g);
+    const MatrixXd more = a.transpose() * h * wa;
+    g += a * wg * a.transpose();
+    a = (a * wa).eval();
+    h += more;
+    h = 0.5 * (h + h.transpose()).eval();
+    g = 0.5 * (g + g.transpose()).eval();
+    if (more.norm() <= rounding * h.norm()) break;
+  }
+  return h;
+}
+
+/// X with X = F X F^T + M.
+MatrixXd lyapunov(MatrixXd f, MatrixXd m) {
+  for (int i = 0; i < most_doublings; ++i) {
+    const MatrixXd more = f * m * f.transpose();
+    m += more;
+    if (more.norm() <= rounding * m.norm()) break;
+    f = (f * f).eval();
+  }
+  return m;
+}
+
+}  // namespace
+
+WanderingForce::WanderingForce(const DualMatrix& noise, const VectorXd& sigma, const LinearSystem& system, const MatrixXd& readings, Partials partials, ExactStep& step) {
+  const Index n = step.transition.rows(), channels = system.C.rows(), samples = readings.rows();
+  const DualMatrix kicks = std::sqrt(step.dt) * (step.transition * noise.grown(n, noise.cols()));
+  reached_ = reached_by(kicks.value, step.transition.value);
+  const auto m = static_cast<Index>(reached_.size());
+  transition_ = step.transition.value(reached_, reached_);
+  const MatrixXd observe = system.C.value(Eigen::all, reached_), drive = kicks.value(reached_, Eigen::all);
+  const MatrixXd known = steady_covariance(transition_, observe, sigma.cwiseAbs2(), drive * drive.transpose());
+  MatrixXd innovation = observe * known * observe.transpose();
+  innovation.diagonal() += sigma.cwiseAbs2();
+  sigma_ = innovation.diagonal().cwiseSqrt();
+  const Eigen::PartialPivLU<MatrixXd> inverse(innovation.transpose());
+  const auto over_innovation = [&](const MatrixXd& rows) -> MatrixXd { return inverse.solve(rows.transpose()).transpose(); };
+  gain_ = over_innovation(transition_ * known * observe.transpose());
+  const MatrixXd closed = transition_ - gain_ * observe;
+
+  const Index parameters = partials == Partials::all ? std::max({step.transition.parameters(), system.C.parameters(), noise.parameters()}) : 0;
+  DualMatrix gain(MatrixXd::Zero(n, channels), parameters);
+  gain.value(reached_, Eigen::all) = gain_;
+  struct Moved {
+    Index parameter;
+    MatrixXd closed, gain, observe, state;
+  };
+  std::vector<Moved> moved;
+  for (Index j = 0; j < parameters && m > 0; ++j) {
+    if (!step.transition.depends_on(j) && !system.C.depends_on(j) && !kicks.depends_on(j)) continue;
+    const MatrixXd da = step.transition.depends_on(j) ? MatrixXd(step.transition.d(j)(reached_, reached_)) : MatrixXd::Zero(m, m);
+    const MatrixXd dc = system.C.depends_on(j) ? MatrixXd(system.C.d(j)(Eigen::all, reached_)) : MatrixXd::Zero(channels, m);
+    MatrixXd half = (da - gain_ * dc) * known * closed.transpose();  // the gain itself is where P is stationary
+    if (kicks.depends_on(j)) half += kicks.d(j)(reached_, Eigen::all) * drive.transpose();
+    const MatrixXd dp = lyapunov(closed, half + half.transpose());
+    const MatrixXd across = observe * known * dc.transpose(), ds = across + across.transpose() + observe * dp * observe.transpose();
+    const MatrixXd dk = over_innovation(da * known * observe.transpose() + transition_ * (dp * observe.transpose() + known * dc.transpose()) - gain_ * ds);
+    MatrixXd all = MatrixXd::Zero(n, channels);
+    all(reached_, Eigen::all) = dk;
+    gain.add_partial(j, all);
+    moved.push_back({j, da - gain_ * dc - dk * observe, dk, dc, MatrixXd::Zero(m, 1 + channels)});
+  }
+
+  // Readings, and each of them raised by 1.
+  readings_.resize(samples, channels);
+  raised_.assign(static_cast<std::size_t>(channels), MatrixXd(samples, channels));
+  slopes_.resize(static_cast<std::size_t>(parameters));
+  for (const Moved& one : moved) slopes_[static_cast<std::size_t>(one.parameter)].resize(samples, channels * (1 + channels));
+  MatrixXd state = MatrixXd::Zero(m, 1 + channels), now = MatrixXd::Identity(channels, 1 + channels);
+  now.rightCols(channels).setIdentity();
+  for (Index k = 0; k < samples; ++k) {
+    now.col(0) = readings.row(k).transpose();
+    const MatrixXd i = now - observe * state;
+    readings_.row(k) = i.col(0).transpose();
+    for (Index c = 0; c < channels; ++c) raised_[static_cast<std::size_t>(c)].row(k) = i.row(c).tail(channels);
+    for (Moved& one : moved) {
+      const MatrixXd slope = -(one.observe * state + observe * one.state);
+      slopes_[static_cast<std::size_t>(one.parameter)].row(k) = slope.reshaped().transpose();
+      one.state = (closed * one.state + one.closed * state + one.gain * now).eval();
+    }
+    state = (closed * state + gain_ * now).eval();
+  }
+
+  step.transition = step.transition - gain * system.C;
+  if (system.D.cols() > 0 && step.input0.cols() == system.D.cols()) step.input0 = step.input0 - gain * system.D;
+  if (partials == Partials::none)
+    for (DualMatrix* changed : {&step.transition, &step.input0}) changed->partial.clear();
+}
+
+VectorXd WanderingForce::slope(Index j, Index channel, const VectorXd& offset) const {
+  const auto index = static_cast<std::size_t>(j);
+  if (index >= slopes_.size() || slopes_[index].size() == 0) return {};
+  const Index channels = readings_.cols();
+  VectorXd slope = slopes_[index].col(channel);
+  for (Index c = 0; c < channels; ++c) slope -= offset[c] * slopes_[index].col((1 + c) * channels + channel);
+  return slope;
+}
+
+MatrixXd WanderingForce::foreseen(const MatrixXd& innovations, const MatrixXd& observe) const {
+  MatrixXd own = MatrixXd::Zero(observe.rows(), static_cast<Index>(reached_.size()));
+  for (std::size_t i = 0; i < reached_.size(); ++i)
+    if (reached_[i] < observe.cols()) own.col(static_cast<Index>(i)) = observe.col(reached_[i]);
+  MatrixXd read(innovations.rows(), observe.rows());
+  VectorXd state = VectorXd::Zero(transition_.rows());
+  for (Index k = 0; k < innovations.rows(); ++k) {
+    read.row(k) = (own * state).transpose();
+    state = (transition_ * state + gain_ * innovations.row(k).transpose()).eval();
+  }
+  return read;
+}
+
+}  // namespace unrig
