@@ -17,7 +17,7 @@ struct FittedMode {
 ///
 ///   H_j(f) = (i w)^p [ sum_k r_jk / (w_k^2 - w^2 + 2 i zeta_k w_k w) + u_j - l_j / w^2 ],   w = 2 pi f
 ///
-/// with p = 0 of displacements and gauges, 1 of velocities, 2 of accelerations; u and l stand for modes above and below. Real and imaginary part of a line have the standard deviation
+/// with p = 0 of displacements and gauges, 1 of velocities, 2 of accelerations; u and l stand for modes far above and below, poles outside of the band for near ones. Real and imaginary part of a line have the standard deviation
 ///
 ///   |H| sqrt((1 - g^2) / (2 n g^2))
 ///
@@ -26,13 +26,14 @@ struct FittedMode {
 struct ModalFit {
   std::vector<FittedMode> modes;         ///< ascending
   Eigen::MatrixXd covariance;            ///< of modes x (frequency, damping ratio, residues)
+  Eigen::Index outside = 0;              ///< poles outside of the band, which are none of `modes`
   double reduced_chi2 = 0;               ///< with `averages` as given; 0 where the weights are only relative
   std::vector<double> share_left;        ///< r.m.s. of what is left of each function, over its r.m.s.
   Eigen::Index place(std::size_t mode) const { return static_cast<Eigen::Index>(mode) * (2 + modes.front().residue.size()); }
 };
 
 struct ModalFitOptions {
-  int modes = 0;     ///< how many; 0: as many as Bayes's criterion (BIC) wants, up to 12
+  int modes = 0;     ///< how many; 0: as many as Bayes's criterion (BIC) wants, up to 12, of which a residue is five standard deviations from 0
   int averages = 0;  ///< blows that were averaged; 0: not known
 };
 

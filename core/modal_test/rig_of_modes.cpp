@@ -129,6 +129,7 @@ RigOfModes rig_of_modes(const std::vector<FrequencyResponse>& functions, const M
     rig.report += fmt::format("    {:>4} {:>24} {:>25} {:>22}{}\n", k + 1, with_error(m.frequency), with_error(m.damping_ratio), with_error(m.mass), parts.gauge >= 0 ? fmt::format(" {:>22}", with_error(m.gauge_gain)) : "");
   }
   for (std::size_t j = 0; j < functions.size(); ++j) rig.report += fmt::format("    of {} ({}) {:.2g} % is left (r.m.s.)\n", functions[j].name, to_string(functions[j].response), 100 * fit.share_left[j]);
+  if (fit.outside > 0) rig.report += fmt::format("    {} more outside of the band, left out\n", fit.outside);
   if (fit.reduced_chi2 > 0) rig.report += fmt::format("    reduced chi-square {:.3g} with the errors of the coherence\n", fit.reduced_chi2);
   for (const FrequencyResponse& f : functions) {
     if (f.coherence.size() == 0) rig.warnings.push_back(fmt::format("{}: no coherence of \"{}\": its lines weigh alike, and the errors are from what is left of them", f.place.file, f.name));

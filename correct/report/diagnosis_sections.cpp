@@ -202,7 +202,7 @@ void add_improvement(ReportPage& page, const json& improvement) {
   if (!fitted.empty())
     page.add_table("Residuals before and after", header, fitted,
                    fmt::format("Before: the rig with nothing added. BIC {} before, {} after.", plain(number_of(improvement, "bic_before"), 7), plain(number_of(improvement, "bic_after"), 7)));
-  if (!predicted.empty()) page.add_table("Runs that were held out", header, predicted, fmt::format("Predicted: none of their readings was fitted but for offsets and where the motion begins. Before: by {}.", rig_alone));
+  if (!predicted.empty()) page.add_table("Runs that were held out", header, predicted, fmt::format("Predicted: parameters are kept, and only the run's own states, offsets and phases are estimated. Before: by {}.", rig_alone));
 }
 
 void add_time_frequency(ReportPage& page, const json& map, const std::vector<Place>& places) {

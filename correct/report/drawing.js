@@ -141,7 +141,7 @@ const unrigDrawing = (() => {
     const marks = (block.marks || []).filter((m) => m.x >= range.x[0] && m.x <= range.x[1]), rows = rows_of_names(marks, px, (name) => 6.5 * name.length);
     marks.forEach((m, i) => {
       element('line', inner, {x1: px(m.x), x2: px(m.x), y1: box.top, y2: box.top + box.h, stroke: look.mark, 'stroke-dasharray': '3 4'});
-      if (rows[i] >= 0) element('text', inner, {x: px(m.x) + 4, y: box.top + 14 + 14 * rows[i], 'font-size': 12, fill: look.mark}, m.name);
+      if (rows[i] >= 0) element('text', inner, {x: Math.min(px(m.x) + 4, box.left + box.w - 6.5 * m.name.length), y: box.top + 14 + 14 * rows[i], 'font-size': 12, fill: look.mark}, m.name);
     });
     for (const s of block.series) curve(inner, block, s, px, py, look.series[s.colour]);
     return svg;

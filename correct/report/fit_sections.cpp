@@ -86,7 +86,7 @@ void add_correlations(ReportPage& page, const json& fit) {
   // Parameters that are held have no correlation.
   std::vector<std::size_t> free;
   for (std::size_t i = 0; i < std::min(matrix.size(), parameters.size()); ++i)
-    if (i < matrix[i].size() && matrix[i][i].is_number() && matrix[i][i].get<double>() > 0) free.push_back(i);
+    if (parameters[i].value("identified", true) && i < matrix[i].size() && matrix[i][i].is_number() && matrix[i][i].get<double>() > 0) free.push_back(i);
   if (free.size() < 2) return;
   HeatMap map{"Correlation of the parameters", "", "", "correlation", {}, {}, {}, "Near +1 or -1 the runs determine a combination of the two better than either.", false, true};
   map.limit = 1;

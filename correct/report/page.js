@@ -85,7 +85,7 @@
     if (block.title) make('h3', parent, block.title);
     report.figures[name] = tools(parent, block.title || name, {csv: () => unrigDrawing.csv.table(block)});
     const t = make('table', make('div', parent, undefined, 'scroll'));
-    const numeric = block.header.map((_, c) => block.rows.length > 0 && block.rows.every((row) => /^\(?[-+\u2212\u2014\d]/.test(row[c] || '\u2014')));
+    const numeric = block.header.map((_, c) => block.rows.length > 0 && block.rows.every((row) => /^(\(?[-+\u2212]?[.\d]|\u2014)/.test(row[c] || '\u2014')));
     const head = make('tr', make('thead', t));
     block.header.forEach((name, c) => make('th', head, name, numeric[c] ? 'number' : '').scope = 'col');
     const body = make('tbody', t);

@@ -113,9 +113,9 @@ void add_shapes(ReportPage& page, const Rig& rig, const FittedRig& fit, const Ru
   const Basis& basis = fitted.model.basis();
   const auto value = [&](const char* name) { return fitted.theta[fitted.model.index(name)]; };
   const NaturalFrequencies natural = natural_frequencies(undamped_system(fitted.rig, basis, run.density), {value("normal.stiffness_scale"), value("torsion.stiffness_scale"), value("apparent_mass_coefficient")});
-  Plot bending{"Mode shapes: displacement", "distance from the clamp [m]", "displacement over its largest", rig.station, {}, "mode shapes"}, twist = bending;
+  Plot bending{"Mode shapes: displacement", "distance from the clamp [m]", "displacement", rig.station, {}, "mode shapes"}, twist = bending;
   twist.title = "Mode shapes: twist";
-  twist.y_label = "twist times semichord, on the same scale";
+  twist.y_label = "twist × semichord";
   for (Index k = 0; k < std::min<Index>(shown, natural.hertz.size()); ++k) {
     const VectorXd h = basis.normal * natural.shape.col(k), turn = basis.twist * natural.shape.col(k) * rig.semichord();
     Index at = 0;
@@ -126,7 +126,7 @@ void add_shapes(ReportPage& page, const Rig& rig, const FittedRig& fit, const Ru
     bending.curves.push_back({name, static_cast<int>(k), h / scale, {}, k % 2 == 1});
     twist.curves.push_back({name, static_cast<int>(k), turn / scale, {}, k % 2 == 1});
   }
-  bending.caption = twist.caption = fmt::format("Undamped, at rest in {}, with the fitted stiffness and apparent mass. One scale for displacement and twist: the larger of the two is 1.", in_words(run).substr(0, in_words(run).find(',')));
+  bending.caption = twist.caption = fmt::format("Undamped, at rest in {}, with the fitted stiffness and apparent mass. One scale for displacement and twist times semichord, of which the larger is 1.", in_words(run).substr(0, in_words(run).find(',')));
   bending.height = twist.height = 220;
   page.add_plot(bending);
   page.add_plot(twist);

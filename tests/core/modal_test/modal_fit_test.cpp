@@ -101,6 +101,24 @@ TEST(ModalFit, WithoutACoherenceTheErrorsFollowWhatIsLeft) {
   for (std::size_t k = 0; k < 3; ++k) EXPECT_LT(std::abs(fit.modes[k].frequency - truth[k].frequency), 4.5 * std::sqrt(fit.covariance(fit.place(k), fit.place(k))));
 }
 
+/// A mode above the band is no mode of the rig, and makes none: with a constant in its place broad ones filled the gap, of which one had a negative mass.
+TEST(ModalFit, AModeJustOutsideOfTheBandIsLeftOut) {
+  std::vector<FrequencyResponse> functions = measured(2, true);
+  for (FrequencyResponse& f : functions)
+    for (Index k = 0; k < f.value.size(); ++k) {
+      const double w = 2 * pi * f.frequency[k], wk = 2 * pi * 190;
+      const std::complex<double> beyond = 1.0 / 0.7 / std::complex<double>(wk * wk - w * w, 2 * 0.01 * wk * w);
+      f.value[k] += f.response == Response::acceleration ? -w * w * beyond : 3e4 * beyond;
+    }
+  const ModalFit fit = fit_modes(functions, {0, averages});
+  ASSERT_EQ(fit.modes.size(), 3u);
+  EXPECT_GE(fit.outside, 1);
+  for (std::size_t k = 0; k < 3; ++k) {
+    const double found[] = {fit.modes[k].frequency, fit.modes[k].damping_ratio, fit.modes[k].residue[0]}, wanted[] = {truth[k].frequency, truth[k].damping_ratio, 1 / truth[k].mass};
+    for (Index i = 0; i < 3; ++i) EXPECT_LT(std::abs(found[i] - wanted[i]), 4.5 * std::sqrt(fit.covariance(fit.place(k) + i, fit.place(k) + i))) << k << ' ' << i;
+  }
+}
+
 TEST(ModalFit, FindsNoModeWhereThereIsNone) {
   std::vector<FrequencyResponse> functions = measured(1, false);
   for (FrequencyResponse& f : functions)
