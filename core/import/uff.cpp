@@ -30,7 +30,8 @@ bool read_fortran(std::string_view text, double& value) {
 
 /// What records 6 to 9 say.
 struct Header {
-  std::string name, unit, title;
+  std::string name, unit, title, reference_unit;
+  int type = 0, node = 0, direction = 0, reference_node = 0, reference_direction = 0;
   int ordinate = 0;  ///< 2, 4: real, single and double; 5, 6: complex
   std::size_t points = 0;
   bool even = false;
@@ -51,6 +52,20 @@ class UffFile {
   UffFile(std::string_view bytes, const std::string& file) : bytes_(bytes), out_{file, "UFF 58", {}, {}} {}
 
   Recording read() {
+    read_all();
+    if (out_.channels.empty())
+      throw InputError({out_.file, line_number_}, functions_.empty() ? "the file holds no dataset 58 with real numbers" : "the functions of the file are complex", "wanted a universal file with datasets 58 of real numbers",
+                       functions_.empty() ? "Copy it again, or export it once more." : "Of frequency response functions `unrig new rig --from impact-test FILE` makes a rig.");
+    return std::move(out_);
+  }
+
+  std::vector<UffFunction> functions() {
+    read_all();
+    return std::move(functions_);
+  }
+
+ private:
+  void read_all() {
     while (at_ < bytes_.size()) {
       if (trimmed(line()) != "-1") continue;
       if (at_ >= bytes_.size()) break;
@@ -61,11 +76,8 @@ class UffFile {
       else
         skip();
     }
-    if (out_.channels.empty()) refuse("the file holds no dataset 58 with real numbers");
-    return std::move(out_);
   }
 
- private:
   [[noreturn]] void refuse(const std::string& what) const {
     throw InputError({out_.file, line_number_}, what, "wanted a universal file with datasets 58", "Copy it again, or export it once more.");
   }
@@ -111,6 +123,13 @@ class UffFile {
     if (direction < 0 && axis < axes.size()) name[0] = '-';
     const int node = integer(entity, 41, 10, "the node");
     h.name = fmt::format("{}:{}", node, name);
+    // Not every program fills these columns as it should.
+    const auto or_zero = [](std::string_view text) { double value = 0; return read_fortran(text, value) && std::abs(value) < 2e9 ? static_cast<int>(value) : 0; };
+    h.type = or_zero(field(entity, 0, 5));
+    h.node = node;
+    h.direction = direction;
+    h.reference_node = or_zero(field(entity, 66, 10));
+    h.reference_direction = or_zero(field(entity, 76, 4));
     const std::string_view form = line();
     h.ordinate = integer(form, 0, 10, "the type of the ordinate");
     const int points = integer(form, 10, 10, "the number of points");
@@ -127,7 +146,7 @@ class UffFile {
     if (node == 0 && direction == 0)  // as from amplifiers, which know of no structure
       for (const std::string& called : {told(h.title), told(field(ordinate, 26, 20))})
         if (!called.empty()) h.name = called;
-    line();  // denominator
+    h.reference_unit = told(field(line(), 47, 20));  // of the denominator
     line();  // z axis
     return h;
   }
@@ -147,7 +166,7 @@ class UffFile {
       const std::string_view data = bytes_.substr(at_, binary.bytes);
       if (data.size() < binary.bytes) refuse("the file ends within the numbers of a binary dataset");
       at_ += binary.bytes;
-      if (binary.ieee && !h.complex()) read_binary(h, binary, data, x, y);
+      if (binary.ieee) read_binary(h, binary, data, x, y);
       if (at_ < bytes_.size() && bytes_[at_] != '\n' && bytes_[at_] != '\r' && bytes_[at_] != ' ') refuse("a binary dataset is longer than it says");
       while (at_ < bytes_.size() && trimmed(line()) != "-1") {
       }
@@ -155,7 +174,8 @@ class UffFile {
     } else {
       read_text(h, x, y);
     }
-    if (h.complex()) return leave_out(h, "its numbers are complex");
+    keep_function(h, x, y);
+    if (h.complex()) return leave_out(h, "its numbers are complex; of frequency response functions `unrig new rig --from impact-test` makes a rig");
     keep(h, std::move(x), std::move(y));
   }
 
@@ -164,14 +184,14 @@ class UffFile {
   void read_binary(const Header& h, const Binary& binary, std::string_view data, std::vector<double>& x, std::vector<double>& y) {
     const std::size_t wide = h.is_double() ? 8 : 4, each = h.points == 0 ? 0 : data.size() / h.points;
     // Programs differ in whether the abscissa of a double function is single or double.
-    const std::size_t before = h.even ? 0 : each == wide + 4 ? 4 : wide;
-    if (h.points > 0 && (each != before + wide || data.size() % h.points != 0))
-      refuse(fmt::format("{} points of {} bytes each do not make the {} bytes that the dataset counts", h.points, before + wide, data.size()));
+    const std::size_t value = h.complex() ? 2 * wide : wide, before = h.even ? 0 : each == value + 4 ? 4 : wide;
+    if (h.points > 0 && (each != before + value || data.size() % h.points != 0))
+      refuse(fmt::format("{} points of {} bytes each do not make the {} bytes that the dataset counts", h.points, before + value, data.size()));
     ByteReader reader(data, binary.big_endian);
     const auto next = [&](std::size_t bytes) { return bytes == 8 ? reader.number<double>() : static_cast<double>(reader.number<float>()); };
     for (std::size_t k = 0; k < h.points; ++k) {
       if (before) x.push_back(next(before));
-      y.push_back(next(wide));
+      for (std::size_t part = 0; part < value / wide; ++part) y.push_back(next(wide));
     }
   }
 
@@ -206,7 +226,17 @@ class UffFile {
       }
       if (column == 0) refuse("a line without numbers within the data");
     }
+    if (!h.even && x.size() != h.points) refuse(fmt::format("{} abscissas for {} points", x.size(), h.points));
     if (trimmed(line()) != "-1") refuse("a dataset is longer than it says");
+  }
+
+  void keep_function(const Header& h, const std::vector<double>& x, const std::vector<double>& y) {
+    UffFunction f{h.type, line_number_, h.node, h.direction, h.reference_node, h.reference_direction, h.name, h.unit, h.reference_unit, x, {}};
+    for (std::size_t k = 0; k < h.points; ++k) {
+      f.value.emplace_back(h.complex() ? std::complex<double>(y[2 * k], y[2 * k + 1]) : std::complex<double>(y[k]));
+      if (h.even) f.abscissa.push_back(h.start + h.step * static_cast<double>(k));
+    }
+    functions_.push_back(std::move(f));
   }
 
   void keep(const Header& h, std::vector<double> x, std::vector<double> y) {
@@ -220,11 +250,14 @@ class UffFile {
   std::size_t at_ = 0;
   int line_number_ = 0;
   std::map<std::string, int> seen_;
+  std::vector<UffFunction> functions_;
   Recording out_;
 };
 
 }  // namespace
 
 Recording read_uff(std::string_view bytes, const std::string& file) { return UffFile(bytes, file).read(); }
+
+std::vector<UffFunction> read_uff_functions(std::string_view bytes, const std::string& file) { return UffFile(bytes, file).functions(); }
 
 }  // namespace unrig

@@ -1,13 +1,23 @@
 #include <algorithm>
 #include <cmath>
+#include <limits>
+#include <optional>
+#include <set>
+#include <utility>
 
 #include <fmt/format.h>
 
+#include "core/files/error.h"
+#include "core/files/heard_warnings.h"
+#include "core/files/text_file.h"
+#include "core/rig/fingerprint.h"
 #include "core/files/csv_table.h"
 #include "core/files/units.h"
 #include "core/model/wagner.h"
 #include "correct/estimate/how_far_to_trust.h"
+#include "correct/report/fit_traces.h"
 #include "correct/report/result_files.h"
+#include "correct/report/rig_sections.h"
 
 namespace unrig {
 namespace {
@@ -72,9 +82,62 @@ void add_warnings(ReportPage& page, const HowFarToTrust& trust) {
   add_provenance(page, trust.made_by.provenance);
 }
 
+/// The lowest and the largest of the finite values.
+std::pair<double, double> span_of(const VectorXd& x) {
+  const auto there = x.array().isFinite();
+  return {there.select(x.array(), std::numeric_limits<double>::infinity()).minCoeff(), there.select(x.array(), -std::numeric_limits<double>::infinity()).maxCoeff()};
+}
+
+/// The scale of the gauge and of the circulatory load: the inertial spike of the whole load, while the angle changes, may be many times that. Nothing where it is not.
+std::optional<std::pair<double, double>> without_spike(const VectorXd& gauge, const VectorXd& circulatory, const VectorXd& load) {
+  const auto [gauge_low, gauge_high] = span_of(gauge);
+  const auto [low, high] = span_of(circulatory);
+  const auto [load_low, load_high] = span_of(load);
+  const double bottom = std::min(gauge_low, low), top = std::max(gauge_high, high), margin = 0.08 * (top - bottom);
+  if (!(top > bottom) || !std::isfinite(top - bottom) || (load_low > bottom - margin && load_high < top + margin)) return std::nullopt;
+  return std::pair{bottom - margin, top + margin};
+}
+
+/// What a table was made from, as far as its files are found and have not changed since.
+struct Origin {
+  std::optional<Rig> rig;
+  std::optional<FittedRig> fit;
+  std::optional<Run> run;
+};
+
+/// The files are the words of the command that made the table; the fingerprints say which is what, and that they are those.
+Origin origin_of(const MadeBy& made, const std::string& table, const ReportOptions& options) {
+  Origin origin;
+  std::string word;
+  std::vector<std::string> words;
+  bool quoted = false;
+  for (const char c : made.provenance.command + " ") {
+    if (c == '\'') quoted = !quoted;
+    else if (!quoted && (c == ' ' || c == '=')) words.push_back(std::exchange(word, ""));
+    else word += c;
+  }
+  for (const std::string& name : words) {
+    const auto file = found_file(name, table, options);
+    if (!file) continue;
+    const HeardWarnings silence;
+    try {
+      if (file->ends_with(".toml")) {
+        if (Rig rig = read_rig(*file); fingerprint(rig) == made.rig) origin.rig = std::move(rig);
+      } else if (file->ends_with(".json")) {
+        if (FittedRig fit = read_fit(*file); fingerprint(fit) == made.fit) origin.fit = std::move(fit);
+      } else if (origin.rig && !origin.run) {
+        if (Run run = read_run(*file); fingerprint(run, *origin.rig) == made.run) origin.run = std::move(run);
+      }
+    } catch (const InputError&) {
+      continue;  // another file of that name
+    }
+  }
+  return origin;
+}
+
 }  // namespace
 
-void add_corrected(ReportPage& page, const std::string& text, const std::string& path) {
+void add_corrected(ReportPage& page, const std::string& text, const std::string& path, const ReportOptions& options) {
   const CsvTable table = read_csv(text, 1, path);
   const CsvColumn& time = column(table, "time");
   const VectorXd& t = increasing(table, time);
@@ -92,13 +155,23 @@ void add_corrected(ReportPage& page, const std::string& text, const std::string&
               name);
   page.add_section("Correction: " + name);
   add_warnings(page, trust);
+  const Origin origin = origin_of(trust.made_by, path, options);
+  std::vector<double> modes;
+  if (origin.rig && origin.fit && origin.run) {
+    tell_conditions(page, *origin.rig, *origin.fit, *origin.run);
+    modes = modes_of(fitted_model(*origin.rig, *origin.fit, *origin.run));
+  }
   page.add_text(is_told ? fmt::format("Gauge and angle are explained to a reduced chi-square of {}; 1 is their noise.", plain(trust.reduced_chi2, 4))
                         : "Warning: the file does not say how well gauge and angle are explained: `unrig correct` of an earlier version wrote it. Correct the run again.");
   const double of_load = band_factor(table, "normal_force"), of_circulatory = band_factor(table, "circulatory");
-  page.add_plot({"Gauge and the load of a rigid rig", time_label, labelled("load", load.unit), t,
-                 {{"gauge reading", 0, gauge.value}, {"rigid-rig load", 1, load.value, band_of(load_std.value, of_load)}}, name,
-                 "The gauge reads the equivalent force at the calibration station, the load is the whole normal force: even at rest they differ by the ratio of their levers. " + caption_of_band(of_load), false,
-                 false, 320});
+  Plot both{"Gauge and the load of a rigid rig", time_label, labelled("load", load.unit), t,
+            {{"gauge reading", 0, gauge.value}, {"rigid-rig load", 1, load.value, band_of(load_std.value, of_load)}}, name,
+            "The gauge reads the equivalent force at the calibration station, the load is the whole normal force: even at rest they differ by the ratio of their levers. " + caption_of_band(of_load), false,
+            false, 320};
+  both.y_range = without_spike(gauge.value, circulatory.value, load.value);
+  if (both.y_range)
+    both.caption += fmt::format(" The inertial load while the angle changes, {} to {} {}, is outside of the scale.", plain(load.value.minCoeff(), 3), plain(load.value.maxCoeff(), 3), load.unit);
+  page.add_plot(both);
   if (const CsvColumn* left = find(table, "unexplained"))
     page.add_plot({"Residual of the gauge", time_label, labelled("recording − model", left->unit), t, {{"residual", 1, left->value}}, name,
                    "What neither the load nor the rig's answer to it accounts for. More than noise here is missing from the load above.", false, false, 180, {}, gauge.value});
@@ -108,7 +181,7 @@ void add_corrected(ReportPage& page, const std::string& text, const std::string&
   page.add_plot({"Normal-force coefficient", "time [semichords since the motion began]", "C_N", increasing(table, column(table, "semichords")),
                  {{"C_N", 1, cn.value, band_of(cn_std.value, of_load)}}, "", caption_of_band(of_load)});
   add_spectra(page, "Spectra before and after the correction", dt, load.unit, {"gauge reading", 0, gauge.value}, {"rigid-rig load", 1, load.value, {}, true},
-              "Amplitude of the whole record, mean removed, Hann window. What the rig adds stands in the reading only.");
+              "Amplitude of the whole record, mean removed, Hann window. What the rig adds stands in the reading only.", modes);
 }
 
 void add_modal_load(ReportPage& page, const std::string& text, const std::string& path) {
@@ -167,6 +240,46 @@ void add_indicial(ReportPage& page, const std::string& text, const std::string& 
   page.add_plot({"Indicial response against Wagner's", "distance since the step [semichords]", "response over its limit", x,
                  {{"estimated", 1, value.tail(rows), band_of(std.tail(rows), factor)}, {"Wagner (exact)", 0, wagners, {}, true}}, "",
                  "Nothing in the estimate assumes Wagner's shape. " + caption_of_band(factor) + " Neighbouring points move together.", true, false, 340});
+}
+
+void add_indicials(ReportPage& page, const std::vector<std::string>& paths) {
+  if (paths.size() < 2) return;
+  struct OfAStep {
+    std::string name;
+    VectorXd s, value, std;
+  };
+  std::vector<OfAStep> all;
+  std::set<double> grid;
+  for (const std::string& path : paths) {
+    const CsvTable table = read_csv(read_text(path), 1, path);
+    const double factor = band_factor(table, "indicial");
+    all.push_back({file_name(path), increasing(table, column(table, "semichords")), column(table, "indicial").value, band_of(column(table, "indicial_std").value, factor)});
+    for (const double s : all.back().s)
+      if (s > 0) grid.insert(s);
+  }
+  const std::vector<double> sorted(grid.begin(), grid.end());
+  const VectorXd x = Eigen::Map<const VectorXd>(sorted.data(), static_cast<Index>(sorted.size()));
+  Plot plot{"Indicial responses of all steps", "distance since the step [semichords]", "response over its limit", x, {}};
+  constexpr std::size_t colours = 4;  // and the grey of Wagner's
+  for (std::size_t k = 0; k < all.size(); ++k) {
+    const auto& [name, s, value, std] = all[k];
+    VectorXd y = VectorXd::Constant(x.size(), std::nan("")), band = y;
+    Index i = 0;
+    for (Index j = 0; j < x.size(); ++j) {
+      if (x[j] < s[0] || x[j] > s[s.size() - 1]) continue;
+      while (i + 2 < s.size() && s[i + 1] < x[j]) ++i;
+      const double share = (x[j] - s[i]) / (s[i + 1] - s[i]);
+      y[j] = value[i] + share * (value[i + 1] - value[i]);
+      band[j] = std[i] + share * (std[i + 1] - std[i]);
+    }
+    plot.curves.push_back({name, 1 + static_cast<int>(k % colours), y, band, k >= colours});
+  }
+  plot.curves.push_back({"Wagner (exact)", 0, x.unaryExpr([](double at) { return wagner_exact(at); }), {}, true});
+  plot.log_x = true;
+  plot.height = 340;
+  plot.caption = "Steps of one airfoil at one speed have one response as long as the fluid is linear; where bands part, angle or size of the step matters. Each band as in the response's own plot; between its points straight lines.";
+  page.add_section("Indicial responses of all steps");
+  page.add_plot(plot);
 }
 
 }  // namespace unrig

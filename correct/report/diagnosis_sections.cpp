@@ -9,6 +9,7 @@
 #include "core/files/error.h"
 #include "correct/report/fit_traces.h"
 #include "correct/report/result_files.h"
+#include "correct/report/rig_sections.h"
 #include "fit/fit_json.h"
 
 namespace unrig {
@@ -74,6 +75,30 @@ std::string range(const json& pairs, std::size_t i, const char* unit) {
   return fmt::format("{} to {} {}", plain(ends[0], 4), plain(ends[1], 4), unit);
 }
 
+/// Where a run's mismatch is: in time [s], in frequency [Hz], or in both.
+struct Place {
+  std::optional<std::pair<double, double>> time, frequency;
+};
+
+std::vector<Place> places_in(const json& mismatch, const std::string& file) {
+  const json runs = member(mismatch, "runs", json::array()), time = member(mismatch, "time", json::array()), frequency = member(mismatch, "frequency", json::array());
+  const auto pair = [](const json& list, std::size_t i) -> std::optional<std::pair<double, double>> {
+    if (i >= list.size() || !list[i].is_array() || list[i].size() != 2 || !list[i][0].is_number() || !list[i][1].is_number()) return std::nullopt;
+    return std::pair{list[i][0].get<double>(), list[i][1].get<double>()};
+  };
+  std::vector<Place> found;
+  for (std::size_t i = 0; i < runs.size(); ++i)
+    if (runs[i].is_string() && runs[i].get<std::string>() == file) found.push_back({pair(time, i), pair(frequency, i)});
+  return found;
+}
+
+std::vector<Box> boxes_of(const std::vector<Place>& places, std::optional<std::pair<double, double>> Place::* side) {
+  std::vector<Box> boxes;
+  for (const Place& place : places)
+    if (const auto& ends = place.*side) boxes.push_back({ends->first, ends->second, "mismatch"});
+  return boxes;
+}
+
 void add_places(ReportPage& page, const json& mismatch) {
   const json runs = member(mismatch, "runs", json::array()), time = member(mismatch, "time", json::array()), frequency = member(mismatch, "frequency", json::array());
   if (const std::string summary = text_of(mismatch, "summary"); !summary.empty()) page.add_text(summary);
@@ -93,11 +118,38 @@ void add_ranking(ReportPage& page, const json& ranking) {
                    "ruled out by the free decays, where the other runs were not fitted.");
 }
 
+std::string acts_on_in_words(const std::string& acts_on) {
+  if (acts_on == "normal") return "a force at the calibration element";
+  if (acts_on == "torsion") return "a moment about the pitch axis";
+  if (acts_on == "lift") return "a normal force on each strip";
+  if (acts_on == "gauge") return "the gauge's reading";
+  if (acts_on == "mount") return "an acceleration of the mount";
+  return acts_on;
+}
+
+/// A law that was found in the recordings: what it is, where it was learnt, and what else would have done.
+void add_law(ReportPage& page, const json& m, const json& law) {
+  const std::string kind = text_of(m, "class").empty() ? text_of(law, "class") : text_of(m, "class"), memory = text_of(law, "memory"), acts_on = text_of(law, "acts_on");
+  page.add_equation("law", (acts_on == "torsion" ? "M = " : acts_on == "gauge" ? "gauge += " : acts_on == "mount" ? "a = " : "F = ") + text_of(law, "force"), text_of(m, "source"));
+  if (!memory.empty()) page.add_equation("memory", "z' = " + memory, "z has no dimension and begins at 0");
+  page.add_text(fmt::format("{}found in these recordings; it is {}.", kind.empty() ? "A law " : "A law of the class \"" + kind + "\", ", acts_on_in_words(acts_on)));
+  std::vector<std::vector<std::string>> learnt, rivals;
+  const json ranges = member(law, "learnt_on", json::object());
+  for (const auto& [symbol, range] : ranges.items())
+    if (range.is_array() && range.size() == 3) learnt.push_back({symbol, plain(range[0].is_number() ? range[0].get<double>() : std::nan("")), plain(range[1].is_number() ? range[1].get<double>() : std::nan("")), range[2].is_string() ? range[2].get<std::string>() : ""});
+  if (!learnt.empty()) page.add_table("Learnt on", {"symbol", "from", "to", "unit"}, learnt, "Outside of these ranges the law is a guess.");
+  for (const json& r : member(law, "rivals", json::array())) rivals.push_back({text_of(r, "force"), plain(number_of(r, "distance_sigma"), 3), plain(number_of(r, "log_odds"), 4)});
+  if (!rivals.empty())
+    page.add_table("Rivals of the law", {"force", "distance [standard deviations]", "log of the odds"}, rivals,
+                   "Distance: between the rival's force and the law's over what the runs visited, in standard deviations of the latter. Odds: of the law against the rival; near 0 the recordings cannot tell them apart.");
+}
+
 void add_missing(ReportPage& page, const json& missing, const std::string& title) {
   std::vector<std::vector<std::string>> rows;
   for (const json& m : missing) {
     const std::string effect = text_of(m, "effect");
-    if (const std::string equation = text_of(m, "equation"); !equation.empty()) page.add_text(effect + ": " + equation);
+    if (const json law = member(m, "law", json::object()); !law.empty()) add_law(page, m, law);
+    else if (const std::string equation = text_of(m, "equation"); !equation.empty()) page.add_equation(effect, equation, text_of(m, "source"));
     if (const std::string advice = text_of(m, "advice"); !advice.empty()) page.add_text(advice + ".");
     for (const json& p : member(m, "parameters", json::array())) {
       const std::string stated = p.contains("stated") ? " (the file says " + plain(number_of(p, "stated"), 6) + ")" : "";
@@ -129,27 +181,31 @@ void add_price(ReportPage& page, const json& shifts) {
   std::vector<std::vector<std::string>> rows;
   for (const json& s : shifts) {
     const double with = number_of(s, "with"), without = number_of(s, "without"), error = number_of(s, "std_error");
-    rows.push_back({text_of(s, "name"), file_name(text_of(s, "run")), plain(without, 6), with_error(with, error), text_of(s, "unit") == "1" ? "" : text_of(s, "unit"), plain((without - with) / error, 3)});
+    rows.push_back({text_of(s, "name"), file_name(text_of(s, "run")), plain(without, 6), with_error(with, error), text_of(s, "unit") == "1" ? "" : text_of(s, "unit"), plain((without - with) / error, 3), plain(100 * (without / with - 1), 3)});
   }
-  if (!rows.empty()) page.add_table("The price of not knowing", {"parameter", "of run", "without the effect", "with it, ± one standard error", "unit", "off, in standard errors"}, rows);
+  if (!rows.empty())
+    page.add_table("The price of not knowing", {"parameter", "of run", "without the effect", "with it, ± one standard error", "unit", "off, in standard errors", "off [%]"}, rows,
+                   "The load of a rigid rig is wrong by as much as the slope of the normal force and the steady normal force are, in percent, and its build-up by what stiffness and apparent mass leave of the rig in it.");
 }
 
 void add_improvement(ReportPage& page, const json& improvement) {
-  std::vector<std::vector<std::string>> rows;
+  std::vector<std::vector<std::string>> fitted, predicted;
   for (const json& r : member(improvement, "runs", json::array())) {
     const double before = number_of(r, "rms_before"), after = number_of(r, "rms_after"), noise = number_of(r, "noise");
     const std::string channel = text_of(r, "channel");
-    const std::string kind = member(r, "heldout", false).get<bool>() ? "held out" : member(r, "set_aside", false).get<bool>() ? "set aside" : "fitted";
-    rows.push_back({file_name(text_of(r, "file")) + (channel.empty() || channel == "gauge" ? "" : ", " + channel), kind, plain(before, 4), plain(after, 4), plain(noise, 4), text_of(r, "unit"),
-                    plain(before / noise, 3), plain(after / noise, 3)});
+    const bool held_out = member(r, "heldout", false).get<bool>();
+    const std::string kind = held_out ? "held out" : member(r, "set_aside", false).get<bool>() ? "set aside" : "fitted";
+    (held_out ? predicted : fitted).push_back({file_name(text_of(r, "file")) + (channel.empty() || channel == "gauge" ? "" : ", " + channel), kind, plain(before, 4), plain(after, 4), plain(noise, 4), text_of(r, "unit"),
+                                               plain(before / noise, 3), plain(after / noise, 3)});
   }
-  if (rows.empty()) return;
-  page.add_table("Residuals before and after", {"run", "", "before (r.m.s.)", "after (r.m.s.)", "noise (std)", "unit", "before / noise", "after / noise"}, rows,
-                 fmt::format("Before: the rig with nothing added; of runs that were not fitted, predicted by {}. BIC {} before, {} after.", rig_alone,
-                             plain(number_of(improvement, "bic_before"), 7), plain(number_of(improvement, "bic_after"), 7)));
+  const std::vector<std::string> header{"run", "", "before (r.m.s.)", "after (r.m.s.)", "noise (std)", "unit", "before / noise", "after / noise"};
+  if (!fitted.empty())
+    page.add_table("Residuals before and after", header, fitted,
+                   fmt::format("Before: the rig with nothing added. BIC {} before, {} after.", plain(number_of(improvement, "bic_before"), 7), plain(number_of(improvement, "bic_after"), 7)));
+  if (!predicted.empty()) page.add_table("Runs that were held out", header, predicted, fmt::format("Predicted: parameters are kept, and only the run's own states, offsets and phases are estimated. Before: by {}.", rig_alone));
 }
 
-void add_time_frequency(ReportPage& page, const json& map) {
+void add_time_frequency(ReportPage& page, const json& map, const std::vector<Place>& places) {
   HeatMap heat{"Residual over time and frequency", "time [s]", "frequency [Hz]", labelled("power", text_of(map, "unit")), doubles(any_of(map, {"time"})), doubles(any_of(map, {"frequency"})), {}};
   const json power = any_of(map, {"power"});
   const std::size_t columns = heat.x.size(), lines = heat.y.size();
@@ -166,6 +222,9 @@ void add_time_frequency(ReportPage& page, const json& map) {
     }
   heat.log_z = true;
   heat.caption = fmt::format("Of {}.", rig_alone);
+  for (const Place& place : places)
+    if (place.time && place.frequency) heat.boxes.push_back({place.time->first, place.time->second, place.frequency->first, place.frequency->second});
+  if (!heat.boxes.empty()) heat.caption += " Boxed: where most of the mismatch is.";
   if (member(map, "noise_above", false).get<bool>()) heat.caption += " Higher frequencies hold nothing but noise.";
   page.add_map(heat);
 }
@@ -202,7 +261,7 @@ DiagnosedTrace read_trace(const json& t, const std::string& unit) {
   return {"", unit, values("time"), values("measured"), values("before"), values("after"), values("missing_force"), values("missing_force_std")};
 }
 
-void add_diagnosed_traces(ReportPage& page, const DiagnosedTrace& trace, const std::string& file) {
+void add_diagnosed_traces(ReportPage& page, const DiagnosedTrace& trace, const std::string& file, const std::vector<Place>& places, const std::vector<double>& modes) {
   const auto& [channel, unit, time, measured, before, after, force, force_std] = trace;
   const std::string of = channel.empty() ? "" : channel + ": ";
   const auto fits = [&time = time](const VectorXd& x) { return x.size() == time.size() && time.size() > 1; };
@@ -210,6 +269,7 @@ void add_diagnosed_traces(ReportPage& page, const DiagnosedTrace& trace, const s
   Plot records{of + "recording and models", "time [s]", labelled("reading", unit), time, {{"recording", 0, measured}}, file};
   Plot left{of + "residuals", "time [s]", labelled("recording − model", unit), time, {}, file};
   left.height = 200;
+  records.boxes = left.boxes = boxes_of(places, &Place::time);
   const auto add = [&, &measured = measured](const char* name, int colour, const VectorXd& model, bool dashed) {
     if (!fits(model)) return;
     records.curves.push_back({fmt::format("model {}", name), colour, model, {}, dashed});
@@ -223,7 +283,7 @@ void add_diagnosed_traces(ReportPage& page, const DiagnosedTrace& trace, const s
   const double dt = (time[time.size() - 1] - time[0]) / static_cast<double>(time.size() - 1);
   if (fits(before) && fits(after))
     add_spectra(page, of + "spectra of the residual before and after", dt, unit, {"residual with nothing added", 2, measured - before},
-                {"residual with what was found", 1, measured - after}, "Amplitude of the whole record, mean removed, Hann window.");
+                {"residual with what was found", 1, measured - after}, "Amplitude of the whole record, mean removed, Hann window.", modes, boxes_of(places, &Place::frequency));
 }
 
 /// The two models that a diagnosis compares, and where its recordings are.
@@ -254,14 +314,17 @@ std::optional<Models> read_models(ReportPage& page, const json& result, const st
 }
 
 /// The load cells and whatever else was fitted, without the angle, which both models follow.
-void add_models(ReportPage& page, const Models& models, const Run& run, const std::string& path) {
+void add_models(ReportPage& page, const Models& models, const Run& run, const std::string& path, const std::vector<Place>& places) {
   warn_of_another(page, models.after, models.rig, run, path);
   const std::vector<FitTrace> after = fit_traces(models.rig, models.after, run);
   const std::vector<FitTrace> before = models.after.effects.empty() ? after : fit_traces(models.rig, models.before, run);
   const VectorXd time = VectorXd::LinSpaced(run.samples(), run.start, run.time(run.samples() - 1));
+  const std::vector<double> modes = modes_of(fitted_model(models.rig, models.after, run));
   for (std::size_t c = 0; c < after.size(); ++c)
-    if (after[c].name != "alpha")
-      add_diagnosed_traces(page, {after[c].name, after[c].unit, time, after[c].measured, models.after.effects.empty() ? VectorXd() : before[c].model, after[c].model, {}, {}}, run.file);
+    if (after[c].name != "alpha") {
+      add_diagnosed_traces(page, {after[c].name, after[c].unit, time, after[c].measured, models.after.effects.empty() ? VectorXd() : before[c].model, after[c].model, {}, {}}, run.file, places, modes);
+      add_residual_checks(page, after[c].name, after[c].measured - after[c].model, after[c].noise, run.dt);
+    }
 }
 
 /// What the file says of one run, wherever it says it: improvement.runs, or lists of their own.
@@ -283,11 +346,12 @@ void add_run(ReportPage& page, const json& result, const json& run, const std::o
   const auto recording = models && !run.value("left_out", false) ? found_file(file, path, options) : std::nullopt;
   if (traces.empty() && map.empty() && !recording) return;
   page.add_section("Recording: " + file_name(file));
+  const std::vector<Place> places = places_in(member(result, "mismatch", json::object()), file);
   if (!traces.empty())
-    add_diagnosed_traces(page, read_trace(traces, text_of(traces, "unit").empty() ? text_of(run, "unit") : text_of(traces, "unit")), file);
+    add_diagnosed_traces(page, read_trace(traces, text_of(traces, "unit").empty() ? text_of(run, "unit") : text_of(traces, "unit")), file, places, {});
   else if (recording)
-    add_models(page, *models, read_run(*recording), path);
-  if (const json m = member(map, "time_frequency", json::object()); !m.empty()) add_time_frequency(page, m);
+    add_models(page, *models, read_run(*recording), path, places);
+  if (const json m = member(map, "time_frequency", json::object()); !m.empty()) add_time_frequency(page, m, places);
   if (const json m = member(map, "restoring_force", json::object()); !m.empty()) add_restoring_force(page, m);
 }
 
@@ -297,17 +361,30 @@ void add_diagnosis(ReportPage& page, const json& result, const std::string& path
   if (!result.contains("mismatch") || !result.contains("missing")) throw InputError({path, 0}, "no \"mismatch\" or no \"missing\"", "wanted a diagnosis.json written by `unrig diagnose`", "");
   add_verdicts(page, result, file_name(path));
   page.add_section("Diagnosis: " + file_name(path));
+  const json improvement = member(result, "improvement", json::object());
+  page.add_heading("Where it is");
   add_places(page, result["mismatch"]);
+  page.add_heading("What it is");
   add_missing(page, result["missing"], "Parameters of what was missing");
   add_closest(page, member(result, "closest", json::object()));
   if (const std::string search = text_of(result, "search_summary"); !search.empty()) page.add_text("Warning: " + search);
-  add_forces(page, member(result, "missing_force", json::array()));
-  add_ranking(page, member(result, "ranking", json::array()));
-  const json improvement = member(result, "improvement", json::object());
+  page.add_heading("Before and after");
   add_improvement(page, improvement);
+  page.add_heading("What it does to the load");
   add_price(page, member(result, "price_of_ignorance", json::array()));
+  add_forces(page, member(result, "missing_force", json::array()));
+  page.add_heading("What else was tried");
+  add_ranking(page, member(result, "ranking", json::array()));
+  page.add_heading("");
   add_provenance(page, result);
   const std::optional<Models> models = read_models(page, result, path, options);
+  if (models) {
+    std::vector<Run> found;
+    for (const std::string& name : models->after.runs)
+      if (const auto file = found_file(name, path, options)) found.push_back(read_run(*file));
+    for (const Run& run : found) tell_conditions(page, models->rig, models->after, run);
+    add_fitted_rig(page, models->rig, models->after, found);
+  }
   std::string drawn;  // a run has one entry for each of its channels
   for (const json& run : member(improvement, "runs", json::array())) {
     if (text_of(run, "file") == drawn && run.contains("channel")) continue;

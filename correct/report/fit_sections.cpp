@@ -8,6 +8,7 @@
 #include "core/files/error.h"
 #include "correct/report/fit_traces.h"
 #include "correct/report/result_files.h"
+#include "correct/report/rig_sections.h"
 
 namespace unrig {
 namespace {
@@ -82,6 +83,21 @@ void add_correlations(ReportPage& page, const json& fit) {
       if (matrix[i][j].is_number() && std::abs(matrix[i][j].get<double>()) >= worth_telling)
         rows.push_back({label(i), label(j), fmt::format("{:+.3f}", matrix[i][j].get<double>())});
   if (!rows.empty()) page.add_table("Correlations of 0.5 and more", {"parameter", "with", "correlation"}, rows);
+  // Parameters that are held have no correlation.
+  std::vector<std::size_t> free;
+  for (std::size_t i = 0; i < std::min(matrix.size(), parameters.size()); ++i)
+    if (parameters[i].value("identified", true) && i < matrix[i].size() && matrix[i][i].is_number() && matrix[i][i].get<double>() > 0) free.push_back(i);
+  if (free.size() < 2) return;
+  HeatMap map{"Correlation of the parameters", "", "", "correlation", {}, {}, {}, "Near +1 or -1 the runs determine a combination of the two better than either.", false, true};
+  map.limit = 1;
+  for (const std::size_t i : free) {
+    map.x.push_back(static_cast<double>(map.x.size()));
+    map.names.push_back(label(i));
+    map.z.emplace_back();
+    for (const std::size_t j : free) map.z.back().push_back(j < matrix[i].size() && matrix[i][j].is_number() ? matrix[i][j].get<double>() : std::nan(""));
+  }
+  map.y = map.x;
+  page.add_map(map);
 }
 
 /// Angles are read in degrees.
@@ -94,7 +110,7 @@ void to_degrees(FitTrace& trace) {
   trace.unit = "deg";
 }
 
-void add_traces(ReportPage& page, const Run& run, std::vector<FitTrace> traces) {
+void add_traces(ReportPage& page, const Run& run, std::vector<FitTrace> traces, const std::vector<double>& modes) {
   const std::string name = file_name(run.file);
   page.add_section("Recording: " + name);
   const VectorXd time = VectorXd::LinSpaced(run.samples(), run.start, run.time(run.samples() - 1));
@@ -108,7 +124,8 @@ void add_traces(ReportPage& page, const Run& run, std::vector<FitTrace> traces) 
   }
   const FitTrace& first = traces.front();
   add_spectra(page, first.name + ": spectra before and after", run.dt, first.unit, {"recording", 0, first.measured}, {"residual", 1, first.measured - first.model},
-              "Amplitude of the whole record, mean removed, Hann window. Lines that stand out of the residual are what the model does not know.");
+              "Amplitude of the whole record, mean removed, Hann window. Lines that stand out of the residual are what the model does not know.", modes);
+  add_residual_checks(page, first.name, first.measured - first.model, first.noise, run.dt);
 }
 
 }  // namespace
@@ -136,16 +153,19 @@ void add_fit(ReportPage& page, const json& result, const std::string& path, cons
   if (!rig_file) return missing("The rig \"" + text_of(result, "rig") + "\"");
   const Rig rig = read_rig(*rig_file);
   if (!can_be_drawn(page, fit, rig, path)) return;
+  std::vector<Run> found;
   for (const std::string& name : fit.runs) {
     const auto file = found_file(name, path, options);
     if (!file) {
       missing("The recording \"" + name + "\"");
       continue;
     }
-    const Run run = read_run(*file);
-    warn_of_another(page, fit, rig, run, path);
-    add_traces(page, run, fit_traces(rig, fit, run));
+    found.push_back(read_run(*file));
+    warn_of_another(page, fit, rig, found.back(), path);
+    tell_conditions(page, rig, fit, found.back());
   }
+  add_fitted_rig(page, rig, fit, found);
+  for (const Run& run : found) add_traces(page, run, fit_traces(rig, fit, run), modes_of(fitted_model(rig, fit, run)));
 }
 
 }  // namespace unrig

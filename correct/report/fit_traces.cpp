@@ -1,6 +1,8 @@
 #include "correct/report/fit_traces.h"
 
 #include <algorithm>
+#include <complex>
+#include <numbers>
 
 #include <fmt/format.h>
 
@@ -28,7 +30,7 @@ void warn_of_another(ReportPage& page, const FittedRig& fit, const Rig& rig, con
   page.add_text("Warning: " + text);
 }
 
-std::vector<FitTrace> fit_traces(const Rig& stated_rig, const FittedRig& fit, const Run& stated_run) {
+FittedModel fitted_model(const Rig& stated_rig, const FittedRig& fit, const Run& stated_run) {
   const FittedNumbers numbers(fit, stated_rig, stated_run);
   const Rig rig = numbers.rig();
   const Run run = numbers.run();
@@ -38,6 +40,26 @@ std::vector<FitTrace> fit_traces(const Rig& stated_rig, const FittedRig& fit, co
   AeroelasticModel model(with_laws(rig, fit), basis, wagner(fit.circulation));
   if (!fit.effects.empty()) model = model.with_effects(fit.effects);
   const Eigen::VectorXd theta = theta_for(model, fit, run.file, conditions_of(run).onset_angle);
+  return {rig, run, model, theta};
+}
+
+std::vector<double> modes_of(const FittedModel& fitted) {
+  constexpr double half_critical = 0.5;
+  const AeroelasticModel bare(fitted.model.rig(), fitted.model.basis(), fitted.model.circulation());
+  const Conditions all = conditions_of(fitted.run);
+  Conditions conditions;
+  conditions.density = all.density;
+  conditions.speed = all.speed;
+  std::vector<double> found;
+  for (const std::complex<double> pole : oscillatory_poles(bare.system(conditions, fitted.theta.head(static_cast<Eigen::Index>(bare.parameters().size())), {}))) {
+    const double hertz = pole.imag() / (2 * std::numbers::pi);
+    if (-pole.real() < half_critical * std::abs(pole) && hertz < 0.5 / fitted.run.dt) found.push_back(hertz);
+  }
+  return found;
+}
+
+std::vector<FitTrace> fit_traces(const Rig& stated_rig, const FittedRig& fit, const Run& stated_run) {
+  const auto [rig, run, model, theta] = fitted_model(stated_rig, fit, stated_run);
   RunResidual residual(model, run, motion_windows(run));
   residual.settle_noise(theta);
   residual.reject_spikes(theta);

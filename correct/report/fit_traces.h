@@ -2,6 +2,7 @@
 #include <string>
 #include <vector>
 
+#include "core/model/aeroelastic_model.h"
 #include "core/rig/rig.h"
 #include "core/run/run.h"
 #include "correct/report/report_page.h"
@@ -13,6 +14,18 @@ namespace unrig {
 /// has another structure, in which the fit's parameters have no meaning.
 bool can_be_drawn(ReportPage& page, const FittedRig& fit, const Rig& rig, const std::string& result);
 void warn_of_another(ReportPage& page, const FittedRig& fit, const Rig& rig, const Run& run, const std::string& result);
+
+/// What a fit makes of a run: rig, run and model with the fit's numbers.
+struct FittedModel {
+  Rig rig;
+  Run run;
+  AeroelasticModel model;  ///< with the fit's effects
+  Eigen::VectorXd theta;
+};
+FittedModel fitted_model(const Rig& rig, const FittedRig& fit, const Run& run);
+
+/// Frequencies [Hz] of the fitted rig's modes in the run's fluid and stream, ascending, up to half the sampling rate: without effects, and without what is damped by half of the critical damping or more.
+std::vector<double> modes_of(const FittedModel& fitted);
 
 /// A fitted channel of a run: what was recorded and what the model says, in SI.
 struct FitTrace {

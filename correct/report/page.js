@@ -4,12 +4,10 @@
   const data = JSON.parse(document.getElementById('report-data').textContent);
   // Okabe and Ito's colours, which the common kinds of colour blindness keep apart; lighter ones on dark ground. Dashes tell series apart too.
   const palette = {
-    light: {ink: '#1b1b1b', line: '#d5d5d5', mark: '#5a5a5a', series: ['#4a4a4a', '#0072b2', '#d55e00', '#00795a', '#a8518a']},
-    dark: {ink: '#e8e8e6', line: '#3a4046', mark: '#a9adb0', series: ['#d8d8d8', '#56b4e9', '#e69f00', '#2fc89a', '#e39bc4']},
+    light: {ink: '#1b1b1b', line: '#d5d5d5', mark: '#5a5a5a', bad: '#a33f00', empty: '#c4c8cc', series: ['#4a4a4a', '#0072b2', '#d55e00', '#00795a', '#a8518a']},
+    dark: {ink: '#e8e8e6', line: '#3a4046', mark: '#a9adb0', bad: '#f0a04b', empty: '#3a4046', series: ['#d8d8d8', '#56b4e9', '#e69f00', '#2fc89a', '#e39bc4']},
   };
-  const cividis = ['#00204c', '#00306f', '#2a406c', '#48526b', '#5e626e', '#727374', '#878479', '#9e9677', '#b6a971', '#d0be67', '#ead357', '#ffea46'];
-  const diverging = ['#2166ac', '#67a9cf', '#d1e5f0', '#f7f7f7', '#fddbc7', '#ef8a62', '#b2182b'];  // blue to red by way of white
-  const report = {graphs: {}, redraw: [], theme: 'system', printing: false};
+  const report = {graphs: {}, pictures: {}, figures: {}, redraw: [], theme: 'system', printing: false};
   window.unrigReport = report;
 
   const make = (name, parent, text, kind) => {
@@ -24,13 +22,7 @@
   const dark = () => !report.printing &&
       (report.theme === 'dark' || (report.theme === 'system' && window.matchMedia('(prefers-color-scheme: dark)').matches));
   const colours = () => palette[dark() ? 'dark' : 'light'];
-  // Four digits; a minus sign as printers set it.
-  const readable = (x) => {
-    if (x === null || !isFinite(x)) return '';
-    const size = Math.abs(x);
-    const text = size !== 0 && (size < 1e-3 || size >= 1e5) ? (+x.toPrecision(3)).toExponential().replace('e+', 'e') : String(+x.toPrecision(5));
-    return text.replace('-', '\u2212');
-  };
+  const {readable, decades} = unrigDrawing;
 
   function verdict(parent, v) {
     const box = make('div', parent, undefined, 'verdict ' + v.tone);
@@ -39,10 +31,61 @@
     make('small', box, v.about);
   }
 
-  function table(parent, block) {
+  const on_paper = () => ({...palette.light, paper: '#ffffff'});
+  function save(name, blob) {
+    const link = make('a');
+    link.download = name;
+    link.href = URL.createObjectURL(blob);
+    link.click();
+    setTimeout(() => URL.revokeObjectURL(link.href), 10000);
+  }
+  // Buttons that save a figure, on white whatever the page is. `of`: {svg: () => element, csv: () => text}.
+  function tools(parent, title, of) {
+    const bar = make('div', undefined, undefined, 'tools'), file = title.toLowerCase().replace(/[^a-z0-9]+/g, '_').replace(/^_|_$/g, '') || 'figure';
+    if (parent.tagName === 'FIGURE') parent.prepend(bar); else parent.appendChild(bar);
+    const button = (kind, act) => {
+      const b = make('button', bar, kind);
+      b.type = 'button';
+      b.title = `save "${title}" as ${kind}`;
+      b.addEventListener('click', act);
+    };
+    if (of.svg) {
+      button('PNG', () => unrigDrawing.painted(of.svg()).then((canvas) => canvas.toBlob((blob) => save(file + '.png', blob))));
+      button('SVG', () => save(file + '.svg', new Blob([unrigDrawing.text_of(of.svg())], {type: 'image/svg+xml'})));
+    }
+    button('CSV', () => save(file + '.csv', new Blob([of.csv()], {type: 'text/csv'})));
+    return {...of, bar};
+  }
+
+  function head(parent, told) {
+    const box = make('section', parent, undefined, 'head'), list = make('dl', box);
+    const fact = (name, text) => { make('dt', list, name); make('dd', list, text); };
+    (told.rigs || []).forEach((rig, i) => fact(i === 0 ? 'rig' : '', rig));
+    if (told.date) fact('page written', told.date);
+    (told.made || []).forEach((made, i) => fact(i === 0 ? 'commands' : '', made));
+    if (told.conditions) table(box, told.conditions, 'conditions');
+  }
+
+  function contents(parent, blocks) {
+    const sections = blocks.filter((block) => block.type === 'section');
+    if (sections.length < 2) return;
+    const nav = make('nav', parent), list = make('ol', nav);
+    nav.setAttribute('aria-label', 'contents');
+    sections.forEach((block, i) => { const link = make('a', make('li', list), block.title); link.href = '#section' + i; });
+  }
+
+  function equation(parent, block) {
+    const line = make('p', parent, undefined, 'equation');
+    if (block.name) make('span', line, block.name, 'name');
+    line.appendChild(unrigEquation.set(block.text));
+    if (block.source) make('span', line, block.source, 'source');
+  }
+
+  function table(parent, block, name) {
     if (block.title) make('h3', parent, block.title);
+    report.figures[name] = tools(parent, block.title || name, {csv: () => unrigDrawing.csv.table(block)});
     const t = make('table', make('div', parent, undefined, 'scroll'));
-    const numeric = block.header.map((_, c) => block.rows.length > 0 && block.rows.every((row) => /^\(?[-+\u2212\u2014\d]/.test(row[c] || '\u2014')));
+    const numeric = block.header.map((_, c) => block.rows.length > 0 && block.rows.every((row) => /^(\(?[-+\u2212]?[.\d]|\u2014)/.test(row[c] || '\u2014')));
     const head = make('tr', make('thead', t));
     block.header.forEach((name, c) => make('th', head, name, numeric[c] ? 'number' : '').scope = 'col');
     const body = make('tbody', t);
@@ -65,38 +108,37 @@
     return block.x.map((x, k) => [x, ...block.series.map((s) => value(s, k))]);
   }
 
-  // Vertical lines with a name, behind the data.
-  function marks(block) {
+  // Behind the data: stretches with a name, and vertical lines with theirs.
+  function underlay(block) {
     return (context, area, graph) => {
       context.save();
+      context.font = '12px sans-serif';
+      const place = (x) => area.x + graph.toPercentXCoord(x) * area.w;  // toDomXCoord takes every axis for linear
+      for (const box of block.boxes || []) {
+        const left = Math.max(area.x, place(box.from)), right = Math.min(area.x + area.w, place(box.to));
+        if (!(right > left)) continue;
+        context.fillStyle = context.strokeStyle = colours().bad;
+        context.globalAlpha = 0.12;
+        context.fillRect(left, area.y, right - left, area.h);
+        context.globalAlpha = 0.6;
+        context.strokeRect(left, area.y, right - left, area.h);
+        context.globalAlpha = 1;
+        context.fillText(box.name, left + 4, area.y + area.h - 6, Math.max(20, area.x + area.w - left - 6));
+      }
       context.strokeStyle = context.fillStyle = colours().mark;
       context.setLineDash([3, 4]);
-      context.font = '12px sans-serif';
-      block.marks.forEach((mark, i) => {
-        const at = graph.toDomXCoord(mark.x);
-        if (at < area.x || at > area.x + area.w) return;
+      const inside = (block.marks || []).filter((mark) => { const at = place(mark.x); return at >= area.x && at <= area.x + area.w; });
+      const rows = unrigDrawing.rows_of_names(inside, place, (name) => context.measureText(name).width);
+      inside.forEach((mark, i) => {
+        const at = place(mark.x), width = context.measureText(mark.name).width;
         context.beginPath();
         context.moveTo(at, area.y);
         context.lineTo(at, area.y + area.h);
         context.stroke();
-        const width = context.measureText(mark.name).width;
-        context.fillText(mark.name, Math.min(at + 4, area.x + area.w - width), area.y + 12 + 14 * (i % 3));
+        if (rows[i] >= 0) context.fillText(mark.name, Math.min(at + 4, area.x + area.w - width), area.y + 12 + 14 * rows[i]);
       });
       context.restore();
     };
-  }
-
-  // Decades with their numbers, and the 2 to 9 between them without.
-  function decades(low, high) {
-    const found = [];
-    for (let power = Math.floor(Math.log10(low)); power <= Math.log10(high); ++power)
-      for (let m = 1; m < 10; ++m) {
-        const v = +(m * Math.pow(10, power)).toPrecision(6);
-        if (v < low || v > high) continue;
-        const narrow = high / low < 50 && (m === 2 || m === 5);
-        found.push({v, label: m === 1 || narrow ? readable(v) : ''});
-      }
-    return found;
   }
 
   const groups = {};  // name -> graphs that zoom together
@@ -145,112 +187,47 @@
       labelsSeparateLines: false, axisLabelFontSize: 13, highlightCircleSize: 3, connectSeparatedPoints: false, logscale: !!block.log_y,
       axes: {
         x: {axisLabelFormatter: readable, valueFormatter: readable, logscale: !!block.log_x, axisLabelWidth: 70, ticker: block.log_x ? decades : Dygraph.numericLinearTicks},
-        y: {axisLabelFormatter: readable, valueFormatter: readable, axisLabelWidth: 72, ticker: block.log_y ? decades : Dygraph.numericLinearTicks},
+        y: {axisLabelFormatter: readable, valueFormatter: readable, axisLabelWidth: 72, ticker: block.log_y ? decades : Dygraph.numericLinearTicks, valueRange: block.y_range || null},
       },
-    }, look(), block.marks ? {underlayCallback: marks(block)} : {}, block.group ? follow(block.group) : {}));
+    }, look(), block.marks || block.boxes ? {underlayCallback: underlay(block)} : {}, block.group ? follow(block.group) : {}));
     if (block.group) (groups[block.group] = groups[block.group] || []).push(graph);
     report.graphs[name] = graph;
+    const range = () => ({x: graph.xAxisRange(), y: graph.yAxisRange()});
+    report.figures[name] = tools(figure, block.title || block.y_label, {svg: () => unrigDrawing.plot(block, range(), on_paper()), csv: () => unrigDrawing.csv.plot(block)});
+    if (block.y_range) {
+      const button = make('button', undefined, 'whole scale');
+      button.type = 'button';
+      let whole = false;
+      button.addEventListener('click', () => {
+        whole = !whole;
+        button.textContent = whole ? 'without the spike' : 'whole scale';
+        graph.updateOptions({axes: {y: {valueRange: whole ? null : block.y_range}}});
+      });
+      report.figures[name].bar.prepend(button);
+    }
     report.redraw.push(() => graph.updateOptions(look()));
   }
 
-  const between = (stops, share) => {
-    const at = Math.min(Math.max(share, 0), 1) * (stops.length - 1), low = Math.min(Math.floor(at), stops.length - 2);
-    const part = (stop, i) => parseInt(stop.slice(1 + 2 * i, 3 + 2 * i), 16);
-    return [0, 1, 2].map((i) => Math.round(part(stops[low], i) + (at - low) * (part(stops[low + 1], i) - part(stops[low], i))));
-  };
-  function ticks(low, high, count) {
-    const rough = (high - low) / count, power = Math.pow(10, Math.floor(Math.log10(rough)));
-    const step = [1, 2, 5, 10].map((m) => m * power).find((s) => s >= rough) || rough;
-    const found = [];
-    for (let k = Math.ceil(low / step); k * step <= high + 1e-9 * step && found.length < 50; ++k) found.push(+(k * step).toPrecision(12));
-    return found;
-  }
-
-  // Without the rows and columns at the rim that hold nothing, but for one.
-  function cropped(block) {
-    const range = (count, holds) => {
-      const held = [...Array(count).keys()].filter(holds);
-      return held.length ? [Math.max(0, held[0] - 1), Math.min(count, held[held.length - 1] + 2)] : [0, count];
-    };
-    const something = (z) => z !== null && z !== undefined;
-    const [left, right] = range(block.x.length, (i) => block.z.some((row) => something(row[i])));
-    const [low, high] = range(block.y.length, (j) => block.z[j].some(something));
-    return {...block, x: block.x.slice(left, right), y: block.y.slice(low, high), z: block.z.slice(low, high).map((row) => row.slice(left, right))};
-  }
-
-  // z over x (columns) and y (rows, the first at the bottom), with its scale at the right.
-  function map(parent, block) {
+  // A figure that is drawn as SVG, at the width that it has.
+  function drawn(parent, block, name, kind, make_svg, csv) {
     const figure = make('figure', parent);
     if (block.title) make('h3', figure, block.title);
-    if (block.signed) block = cropped(block);
-    const canvas = make('canvas', figure, undefined, 'map');
-    canvas.setAttribute('role', 'img');
-    canvas.setAttribute('aria-label', `${block.title}: ${block.z_label} over ${block.x_label} and ${block.y_label}`);
+    const box = make('div', figure, undefined, 'drawn ' + kind);
+    box.setAttribute('role', 'img');
+    box.setAttribute('aria-label', block.title);
     if (block.caption) make('figcaption', figure, block.caption);
-    const values = block.z.flat().filter((z) => z !== null && (!block.log_z || z > 0)).map((z) => block.log_z ? Math.log10(z) : z);
-    let low = values.reduce((a, b) => Math.min(a, b), Infinity), high = values.reduce((a, b) => Math.max(a, b), -Infinity);
-    if (block.log_z) low = Math.max(low, high - 6);
-    if (block.signed) { high = Math.max(Math.abs(low), Math.abs(high)); low = -high; }
-    if (!(high > low)) high = low + 1;
-    const stops = block.signed ? diverging : cividis;
-    const columns = block.x.length, lines = block.y.length;
-    const image = document.createElement('canvas');
-    image.width = columns; image.height = lines;
-    const pixels = image.getContext('2d').createImageData(columns, lines);
-    for (let j = 0; j < lines; ++j) {
-      for (let i = 0; i < columns; ++i) {
-        let z = block.z[j][i];
-        if (z === null || z === undefined) continue;  // stays transparent
-        if (block.log_z) z = z > 0 ? Math.log10(z) : low;
-        const at = 4 * ((lines - 1 - j) * columns + i);
-        pixels.data.set([...between(stops, (z - low) / (high - low)), 255], at);
-      }
-    }
-    image.getContext('2d').putImageData(pixels, 0, 0);
-    const edges = (at) => {
-      const half = at.length > 1 ? (at[at.length - 1] - at[0]) / (at.length - 1) / 2 : 0.5;
-      return [at[0] - half, at[at.length - 1] + half];
-    };
-    const draw = () => {
-      const sharp = window.devicePixelRatio || 1, width = canvas.clientWidth || 900, height = block.height || 320;
-      canvas.style.height = height + 'px';
-      canvas.width = width * sharp; canvas.height = height * sharp;
-      const c = canvas.getContext('2d'), left = 76, right = 110, bottom = 46, top = 10, w = width - left - right, h = height - top - bottom;
-      c.scale(sharp, sharp);
-      c.imageSmoothingEnabled = false;
-      c.fillStyle = dark() ? '#3a4046' : '#c4c8cc';  // seen where a cell is empty, and no colour of either scale
-      if (block.signed) c.fillRect(left, top, w, h);
-      c.drawImage(image, left, top, w, h);
-      c.fillStyle = c.strokeStyle = colours().ink;
-      c.strokeRect(left, top, w, h);
-      c.font = '13px sans-serif';
-      const [x0, x1] = edges(block.x), [y0, y1] = edges(block.y);
-      c.textAlign = 'center';
-      for (const t of ticks(x0, x1, 8)) c.fillText(readable(t), left + (t - x0) / (x1 - x0) * w, top + h + 18);
-      c.fillText(block.x_label, left + w / 2, height - 6);
-      c.textAlign = 'right';
-      for (const t of ticks(y0, y1, 6)) c.fillText(readable(t), left - 6, top + h - (t - y0) / (y1 - y0) * h + 4);
-      for (let k = 0; k < h; ++k) {
-        c.fillStyle = `rgb(${between(stops, 1 - k / h).join()})`;
-        c.fillRect(left + w + 16, top + k, 14, 1.5);
-      }
-      c.fillStyle = colours().ink;
-      c.textAlign = 'left';
-      for (const t of ticks(low, high, 4)) c.fillText(block.log_z ? readable(Math.pow(10, t)) : readable(t), left + w + 34, top + h - (t - low) / (high - low) * h + 4);
-      const upright = (text, x) => {
-        c.save();
-        c.translate(x, top + h / 2);
-        c.rotate(-Math.PI / 2);
-        c.textAlign = 'center';
-        c.fillText(text, 0, 0);
-        c.restore();
-      };
-      upright(block.y_label, 14);
-      upright(block.z_label, width - 6);
-    };
+    report.figures[name] = tools(figure, block.title, {svg: () => make_svg(on_paper(), 900, true), csv});
+    const draw = () => box.replaceChildren(make_svg(colours(), Math.max(280, Math.floor(box.clientWidth || 900)), false));
     report.redraw.push(draw);
+    draw();
     requestAnimationFrame(draw);
   }
+  function map(parent, block, name) {
+    const colour = unrigDrawing.coloured(block);
+    report.pictures[name] = colour.image;
+    drawn(parent, block, name, 'map', (look, width, titled) => unrigDrawing.map(colour, look, width, titled), () => unrigDrawing.csv.map(block));
+  }
+  const bars = (parent, block, name) => drawn(parent, block, name, 'bars', (look, width, titled) => unrigDrawing.bars(block, look, width, titled), () => unrigDrawing.csv.bars(block));
 
   function restyle() {
     document.documentElement.dataset.theme = dark() ? 'dark' : 'light';
@@ -267,14 +244,23 @@
   document.getElementById('title').textContent = data.title;
   document.getElementById('version').textContent = data.version;
   const main = document.getElementById('report');
+  if (data.head) head(main, data.head);
   for (const v of data.verdicts) verdict(main, v);
-  let section = main;
+  contents(main, data.blocks);
+  let section = main, sections = 0;
   data.blocks.forEach((block, i) => {
-    if (block.type === 'section') make('h2', section = make('section', main), block.title);
+    const name = block.type + i;
+    if (block.type === 'section') {
+      section = make('section', main);
+      make('h2', section, block.title).id = 'section' + sections++;
+    }
+    if (block.type === 'heading') make('h3', section, block.title, 'chapter');
     if (block.type === 'text') make('p', section, block.text);
-    if (block.type === 'table') table(section, block);
-    if (block.type === 'plot') plot(section, block, 'plot' + i);
-    if (block.type === 'map') map(section, block);
+    if (block.type === 'equation') equation(section, block);
+    if (block.type === 'table') table(section, block, name);
+    if (block.type === 'plot') plot(section, block, name);
+    if (block.type === 'map') map(section, block, name);
+    if (block.type === 'bars') bars(section, block, name);
   });
   const order = ['system', 'light', 'dark'];
   document.getElementById('theme').addEventListener('click', () => report.setTheme(order[(order.indexOf(report.theme) + 1) % 3]));

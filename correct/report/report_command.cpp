@@ -1,9 +1,12 @@
 #include "correct/report/report_command.h"
 
 #include <CLI/CLI.hpp>
+#include <fmt/chrono.h>
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cstdlib>
+#include <ctime>
 #include <vector>
 
 #include "core/files/command.h"
@@ -45,8 +48,10 @@ struct Pairs {
     std::string path, made_by;
   };
   std::vector<Table> corrected, indicial;
+  std::vector<std::string> responses;  ///< all indicial responses, of earlier versions too
 
   void take(const std::string& path, const std::string& header) {
+    if (header.starts_with("semichords,indicial")) responses.push_back(path);
     const std::size_t at = header.find(MadeBy::prefix);
     if (at == std::string::npos) return;
     const std::size_t first = at + MadeBy::prefix.size();
@@ -76,9 +81,16 @@ void add_result(ReportPage& page, const std::string& path, const ReportOptions& 
   if (const std::size_t first = text.find_first_not_of(" \t\r\n"); first != std::string::npos && text[first] == '{') return add_json(page, text, path, options);
   if (header.starts_with("semichords,indicial")) return add_indicial(page, text, path);
   if (header.find(",from_inputs") != std::string::npos) return add_modal_load(page, text, path);
-  if (header.find("normal_force_std") != std::string::npos) return add_corrected(page, text, path);
+  if (header.find("normal_force_std") != std::string::npos) return add_corrected(page, text, path, options);
   if (simulated_run(text)) return add_simulated(page, text, path, options);
   throw InputError({path, 1}, "neither JSON nor a simulated run nor the header of a corrected record or an indicial response", wanted, "A recording itself is drawn with the fit.json that it belongs to.");
+}
+
+/// The day on which the page is written; of a build that is to be the same again, what SOURCE_DATE_EPOCH says (reproducible-builds.org).
+std::string today() {
+  std::time_t now = std::time(nullptr);
+  if (const char* epoch = std::getenv("SOURCE_DATE_EPOCH")) now = static_cast<std::time_t>(std::strtoll(epoch, nullptr, 10));
+  return fmt::format("{:%Y-%m-%d}", fmt::gmtime(now));
 }
 
 }  // namespace
@@ -102,6 +114,7 @@ int report_command(int argc, char** argv) {
   if (title.empty())
     for (const std::string& path : results) title += (title.empty() ? "" : ", ") + file_name(path);
   ReportPage page(title);
+  page.tell_date(today());
   Progress progress;
   Pairs pairs;
   for (const std::string& path : results) {
@@ -110,6 +123,7 @@ int report_command(int argc, char** argv) {
   }
   progress.clear();
   pairs.check();
+  add_indicials(page, pairs.responses);
   const std::string html = page.html();
   write_text(output, html);
   fmt::print("{}: {} result{}, {:.2f} MB\n", output, results.size(), results.size() == 1 ? "" : "s", static_cast<double>(html.size()) / 1e6);

@@ -71,6 +71,10 @@ Stretch stretch_of(const Plot& plot, Index first, Index last) {
   return stretch;
 }
 
+void push_once(json& list, const json& item) {
+  if (std::find(list.begin(), list.end(), item) == list.end()) list.push_back(item);
+}
+
 const char* name_of(Tone tone) { return tone == Tone::good ? "good" : tone == Tone::bad ? "bad" : tone == Tone::open ? "open" : "told"; }
 
 }  // namespace
@@ -83,13 +87,21 @@ void ReportPage::add_verdict(Tone tone, const std::string& text, const std::stri
   data_["verdicts"].push_back({{"tone", name_of(tone)}, {"text", text}, {"about", about}});
 }
 
-void ReportPage::add_section(const std::string& title) { data_["blocks"].push_back({{"type", "section"}, {"title", title}}); }
+void ReportPage::push(json block) {
+  if (!heading_.empty()) data_["blocks"].push_back({{"type", "heading"}, {"title", std::exchange(heading_, "")}});
+  data_["blocks"].push_back(std::move(block));
+}
 
-void ReportPage::add_text(const std::string& text) { data_["blocks"].push_back({{"type", "text"}, {"text", text}}); }
+void ReportPage::add_section(const std::string& title) {
+  heading_.clear();
+  push({{"type", "section"}, {"title", title}});
+}
+
+void ReportPage::add_text(const std::string& text) { push({{"type", "text"}, {"text", text}}); }
 
 void ReportPage::add_table(const std::string& title, const std::vector<std::string>& header, const std::vector<std::vector<std::string>>& rows,
                            const std::string& caption) {
-  data_["blocks"].push_back({{"type", "table"}, {"title", title}, {"header", header}, {"rows", rows}, {"caption", caption}});
+  push({{"type", "table"}, {"title", title}, {"header", header}, {"rows", rows}, {"caption", caption}});
 }
 
 std::vector<Index> kept_rows(const Plot& plot, Index most) {
@@ -133,16 +145,48 @@ void ReportPage::add_plot(const Plot& plot) {
     if (curve.std.size() > 0) series["std"] = numbers(curve.std, rows, 3);
     block["series"].push_back(series);
   }
+  for (const Box& box : plot.boxes) block["boxes"].push_back({{"from", rounded(box.from)}, {"to", rounded(box.to)}, {"name", box.name}});
+  if (plot.y_range) block["y_range"] = {rounded(plot.y_range->first), rounded(plot.y_range->second)};
   for (const auto& [x, name] : plot.marks) block["marks"].push_back({{"x", rounded(x)}, {"name", name}});
-  data_["blocks"].push_back(block);
+  push(block);
 }
 
 void ReportPage::add_map(const HeatMap& map) {
   json z = json::array();
   for (const std::vector<double>& row : map.z) z.push_back(numbers(row));
-  data_["blocks"].push_back({{"type", "map"},           {"title", map.title},     {"x_label", map.x_label}, {"y_label", map.y_label},
-                             {"z_label", map.z_label},  {"x", numbers(map.x)},    {"y", numbers(map.y)},    {"z", z},
-                             {"caption", map.caption},  {"log_z", map.log_z},     {"signed", map.is_signed}});
+  json block = {{"type", "map"},          {"title", map.title},  {"x_label", map.x_label}, {"y_label", map.y_label}, {"z_label", map.z_label}, {"x", numbers(map.x)}, {"y", numbers(map.y)}, {"z", z},
+                {"caption", map.caption}, {"log_z", map.log_z},  {"signed", map.is_signed}};
+  for (const MapBox& box : map.boxes) block["boxes"].push_back({{"from", rounded(box.from)}, {"to", rounded(box.to)}, {"low", rounded(box.low)}, {"high", rounded(box.high)}});
+  if (!map.names.empty()) block["x_names"] = block["y_names"] = map.names;
+  if (map.limit > 0) block["limit"] = map.limit;
+  push(block);
+}
+
+void ReportPage::add_bars(const std::string& title, const std::string& label, const std::vector<Bar>& bars, const std::string& caption) {
+  json rows = json::array();
+  for (const Bar& b : bars) rows.push_back({{"name", b.name}, {"value", rounded(b.value)}, {"low", rounded(b.low)}, {"high", rounded(b.high)}, {"text", b.text}, {"colour", b.colour}});
+  push({{"type", "bars"}, {"title", title}, {"label", label}, {"caption", caption}, {"rows", rows}});
+}
+
+void ReportPage::add_heading(const std::string& title) { heading_ = title; }
+
+void ReportPage::add_equation(const std::string& name, const std::string& equation, const std::string& source) {
+  push({{"type", "equation"}, {"name", name}, {"text", equation}, {"source", source}});
+}
+
+void ReportPage::tell_date(const std::string& date) { data_["head"]["date"] = date; }
+
+void ReportPage::tell_rig(const std::string& rig) { push_once(data_["head"]["rigs"], rig); }
+
+void ReportPage::tell_command(const std::string& command) { push_once(data_["head"]["made"], command); }
+
+void ReportPage::tell_run(const RunFacts& run) {
+  json& table = data_["head"]["conditions"];
+  if (table.is_null())
+    table = {{"title", "Conditions"}, {"header", {"run", "kind", "medium", "density [kg/m³]", "speed [m/s]", "reduced frequency", "Reynolds number", "length [s]"}}, {"rows", json::array()},
+             {"caption", "Reduced frequency: π f c / U, f the lowest frequency of the rig in that fluid. Reynolds number with the chord; viscosity of water and air at 20 °C (1.0016e-3 and 1.813e-5 Pa s), by the run's medium."}};
+  const auto number = [](double x, int digits) { return std::isfinite(x) ? fmt::format("{:.{}g}", x, digits) : std::string("—"); };
+  push_once(table["rows"], {run.file, run.kind, run.medium, number(run.density, 5), number(run.speed, 4), number(run.reduced_frequency, 3), number(run.reynolds_number, 3), number(run.seconds, 4)});
 }
 
 std::string ReportPage::html() const {

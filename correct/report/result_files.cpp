@@ -51,7 +51,7 @@ std::string text_of(const json& object, const char* key) {
 }
 
 void add_provenance(ReportPage& page, const Provenance& made) {
-  if (!made.program.empty()) page.add_text(fmt::format("Made by {}: {}", made.program, made.command));
+  if (!made.program.empty()) page.tell_command(fmt::format("Made by {}: {}", made.program, made.command));
 }
 
 void add_provenance(ReportPage& page, const json& result) { add_provenance(page, Provenance{text_of(result, "program"), text_of(result, "command")}); }
@@ -81,20 +81,25 @@ VectorXd whole(VectorXd x) {
 }  // namespace
 
 void add_spectra(ReportPage& page, const std::string& title, double dt, const std::string& unit, const Curve& before, const Curve& after,
-                 const std::string& caption) {
+                 const std::string& caption, const std::vector<double>& modes, const std::vector<Box>& boxes) {
   const Index samples = std::min(before.value.size(), after.value.size());
   if (samples < 8 || !(dt > 0)) return;
+  constexpr double beyond_the_last = 1.3;
   Plot plot{title, "frequency [Hz]", labelled("amplitude", unit), {}, {before, after}};
   for (Curve& curve : plot.curves) {
     const Spectrum spectrum = amplitude_spectrum(whole(curve.value.head(samples)), dt);
-    const Index lines = spectrum.line.size() - 1;  // line 0 is what is left of the mean
-    curve.value = spectrum.line.tail(lines).cwiseAbs();
+    Index lines = spectrum.line.size() - 1;  // line 0 is what is left of the mean
+    if (!modes.empty()) lines = std::clamp<Index>(static_cast<Index>(std::ceil(beyond_the_last * modes.back() / spectrum.frequency(1))), std::min<Index>(8, lines), lines);
+    curve.value = spectrum.line.segment(1, lines).cwiseAbs();
     // A logarithmic axis has no place for zero: exact zeros stand where rounding would.
     curve.value = curve.value.cwiseMax(1e-12 * std::max(curve.value.maxCoeff(), 1e-300));
     plot.x = VectorXd::LinSpaced(lines, spectrum.frequency(1), spectrum.frequency(lines));
   }
-  plot.log_y = true;
+  plot.log_x = plot.log_y = true;
   plot.caption = caption;
+  plot.boxes = boxes;
+  for (std::size_t k = 0; k < modes.size(); ++k) plot.marks.emplace_back(modes[k], fmt::format("{}: {:.3g} Hz", k + 1, modes[k]));
+  if (!modes.empty()) plot.caption += " Dotted: the modes of the fitted rig in this fluid and stream, effects aside.";
   page.add_plot(plot);
 }
 

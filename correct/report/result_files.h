@@ -32,7 +32,7 @@ std::string text_of(const nlohmann::json& object, const char* key);
 /// Up to `digits` digits, an em dash where it is not finite.
 std::string plain(double x, int digits = 5);
 
-/// What made a result; nothing where it does not say.
+/// What made a result, told in the head of the page; nothing where it does not say.
 void add_provenance(ReportPage& page, const Provenance& made);
 void add_provenance(ReportPage& page, const nlohmann::json& result);
 /// The `warnings` of a result, as texts of the section.
@@ -51,13 +51,20 @@ void add_trial(ReportPage& page, const nlohmann::json& result, const std::string
 void add_batch(ReportPage& page, const BatchResult& result, const std::string& name);
 /// A run that `unrig simulate` wrote, beside the recording that it was simulated from where that is found.
 void add_simulated(ReportPage& page, const std::string& text, const std::string& path, const ReportOptions& options);
-void add_corrected(ReportPage& page, const std::string& text, const std::string& path);
+void add_corrected(ReportPage& page, const std::string& text, const std::string& path, const ReportOptions& options);
 /// `unrig correct` on a rig that is known only as modes.
 void add_modal_load(ReportPage& page, const std::string& text, const std::string& path);
 void add_indicial(ReportPage& page, const std::string& text, const std::string& path);
 
-/// Amplitude spectra of two records on one grid, `dt` [s] apart, in the unit of the records: means removed, Hann window, missing samples bridged.
+/// The indicial responses of several steps in one plot; nothing of fewer than two.
+void add_indicials(ReportPage& page, const std::vector<std::string>& paths);
+
+/// Amplitude spectra of two records on one grid, `dt` [s] apart, in the unit of the records: means removed, Hann window, missing samples bridged. `modes` [Hz], ascending, are marked, and the
+/// axis ends behind the last of them; without them at half the sampling rate. `boxes`: bands [Hz] to be boxed.
 void add_spectra(ReportPage& page, const std::string& title, double dt, const std::string& unit, const Curve& before, const Curve& after,
-                 const std::string& caption);
+                 const std::string& caption, const std::vector<double>& modes = {}, const std::vector<Box>& boxes = {});
+
+/// Whether a residual is white and normal: its autocorrelation, and its quantiles against those of the normal distribution. `name` of the channel, `sigma` its noise in the residual's unit, `dt` [s].
+void add_residual_checks(ReportPage& page, const std::string& name, const Eigen::VectorXd& residual, double sigma, double dt);
 
 }  // namespace unrig

@@ -1,3 +1,5 @@
+#include <algorithm>
+#include <cmath>
 #include <set>
 
 #include <fmt/format.h>
@@ -56,6 +58,22 @@ void add_sizes(ReportPage& page, const json& effects) {
                  "Sizes: the largest r.m.s. that the effect makes in a run, over the noise of the gauge. Named as good: the diagnosis said that these runs cannot tell it from what it named.");
 }
 
+/// 95 % of the share that `found` of `all` shows (E. B. Wilson, J. American Statistical Association 22 (1927) 209).
+Bar share_of(const std::string& name, int found, int all, int colour) {
+  constexpr double z = 1.959964;
+  const double n = all, p = found / n, centre = (p + z * z / (2 * n)) / (1 + z * z / n), half = z / (1 + z * z / n) * std::sqrt(p * (1 - p) / n + z * z / (4 * n * n));
+  return {name, p, std::max(0.0, centre - half), std::min(1.0, centre + half), fmt::format("{} of {}", found, all), colour};
+}
+
+void add_shares(ReportPage& page, const json& effects, int nulls, int alarms) {
+  std::vector<Bar> bars;
+  for (const json& e : effects)
+    if (const int hidden = e.value("hidden", 0); hidden > 0) bars.push_back(share_of(text_of(e, "effect"), e.value("found", 0), hidden, 1));
+  if (nulls > 0) bars.push_back(share_of("false alarm", alarms, nulls, 2));
+  if (!bars.empty())
+    page.add_bars("What was found of what was hidden", "campaigns [%]", bars, "Of the campaigns that hid an effect, those in which it was named; of those that hid nothing, those in which something was named. Lines: 95 % intervals (Wilson) of the share, for so many campaigns.");
+}
+
 void add_failures(ReportPage& page, const json& trials) {
   for (const json& trial : trials)
     if (const std::string failure = text_of(trial, "failure"); !failure.empty()) page.add_text("Warning: a campaign failed: " + failure);
@@ -76,6 +94,7 @@ void add_trial(ReportPage& page, const json& result, const std::string& path) {
   for (const json& recording : result.value("recordings", json::array())) like += (like.empty() ? "runs like " : ", ") + file_name(recording.get<std::string>());
   page.add_text(fmt::format("Simulated campaigns with {}, a noise of {} {} and the random numbers of seed {}.", like.empty() ? "two plucks and three steps" : like, plain(number_of(noise, "gauge"), 4),
                             text_of(noise, "unit"), result.at("seed").dump()));
+  add_shares(page, result.at("effects"), nulls, alarms);
   add_confusion(page, result.at("confusion"));
   add_sizes(page, result.at("effects"));
   add_failures(page, trials);

@@ -40,7 +40,8 @@ window.addEventListener('load', () => {  // all at once: --dump-dom comes right 
     for (let k = 0; k < graph.numRows(); ++k) { const v = [].concat(graph.getValue(k, 1)); if (v.every((x) => x !== null && isFinite(x))) ++numbers; }
     found.plots.push({name, rows: graph.numRows(), numbers, ink, x: graph.getOption('xlabel'), y: graph.getOption('ylabel'), range: graph.xAxisRange()});
   }
-  const graphs = Object.values(unrigReport.graphs), first = graphs[0], second = graphs[1], other = graphs[graphs.length - 1];
+  const graphs = Object.values(unrigReport.graphs), linear = graphs.filter((graph) => !graph.getOptionForAxis('logscale', 'x')), first = linear[0], second = linear[1], other = graphs[graphs.length - 1];
+  found.whole = first.xAxisRange();
   const other_before = other.xAxisRange();
   const box = first.canvas_.getBoundingClientRect(), area = first.getArea();
   const mouse = (type, share, target) => target.dispatchEvent(new MouseEvent(type, {bubbles: true, cancelable: true, view: window, button: 0, buttons: 1,
@@ -58,7 +59,14 @@ window.addEventListener('load', () => {  // all at once: --dump-dom comes right 
   unrigReport.setTheme('dark'); found.dark = paper();
   window.dispatchEvent(new Event('beforeprint')); found.printed = paper();
   window.dispatchEvent(new Event('afterprint'));
-  found.maps = [...document.querySelectorAll('canvas.map')].map((c) => { const p = c.getContext('2d').getImageData(0, 0, c.width, c.height).data; const seen = new Set();
+  found.shown_maps = document.querySelectorAll('.map svg image').length;
+  found.mismatches = document.querySelectorAll('.map svg .mismatch').length;
+  found.equations = [...document.querySelectorAll('math')].map((equation) => equation.textContent);
+  found.links = [...document.querySelectorAll('nav a')].filter((link) => document.querySelector(link.getAttribute('href'))).length;
+  found.sections = document.querySelectorAll('h2').length;
+  // A mark stands where its frequency is, on a logarithmic axis too: the dots of the lines that are drawn behind the data.
+  found.log_axes = graphs.filter((graph) => graph.getOptionForAxis('logscale', 'x')).map((graph) => graph.toPercentXCoord(Math.sqrt(graph.xAxisRange()[0] * graph.xAxisRange()[1])));
+  found.maps = Object.values(unrigReport.pictures).map((c) => { const p = c.getContext('2d').getImageData(0, 0, c.width, c.height).data; const seen = new Set();
     for (let i = 0; i < p.length; i += 4) seen.add((p[i] << 16) + (p[i + 1] << 8) + p[i + 2]); return seen.size; });
   document.body.textContent = 'FOUND' + JSON.stringify(found) + 'END';
 });
@@ -113,7 +121,7 @@ TEST(ReportInABrowser, LoadsDrawsAndZooms) {
     EXPECT_THAT(plot["x"].get<std::string>(), HasSubstr("[")) << plot;
   }
   // The drag went from a quarter to half of the axis; a pixel on either side.
-  const double low = found["plots"][0]["range"][0], high = found["plots"][0]["range"][1], pixel = (high - low) / 800;
+  const double low = found["whole"][0], high = found["whole"][1], pixel = (high - low) / 800;
   for (const json& range : found["zoomed"]) {
     EXPECT_NEAR(range[0].get<double>(), low + (high - low) * 0.25, 2 * pixel);
     EXPECT_NEAR(range[1].get<double>(), low + (high - low) * 0.5, 2 * pixel);
@@ -126,8 +134,64 @@ TEST(ReportInABrowser, LoadsDrawsAndZooms) {
   EXPECT_THAT(found["light"].get<std::string>(), HasSubstr("rgb(255, 255, 255)"));
   EXPECT_NE(found["dark"], found["light"]);
   EXPECT_EQ(found["printed"], found["light"]);
-  ASSERT_EQ(found["maps"].size(), 2u);
-  for (const json& colours : found["maps"]) EXPECT_GT(colours, 6) << "a map of fewer colours than values";
+  ASSERT_EQ(found["maps"].size(), 3u) << "of correlation, and the two of the diagnosis";
+  for (const json& colours : found["maps"]) EXPECT_GE(colours, 5) << "a map of fewer colours than values: the smallest has four and an empty cell";
+  EXPECT_EQ(found["shown_maps"], 3);
+  EXPECT_EQ(found["mismatches"], 1);
+  EXPECT_EQ(found["equations"], json({"F\u2009=\u2009\u2212c\u2009v\u2009|v|"}));
+  EXPECT_GT(found["sections"], 5);
+  EXPECT_EQ(found["links"], found["sections"]);
+  for (const json& middle : found["log_axes"]) EXPECT_NEAR(middle.get<double>(), 0.5, 1e-9);
+}
+
+/// Behind the page's own script: what every figure saves.
+constexpr const char* save_figures = R"(<script>
+window.addEventListener('load', async () => {
+  const found = [];
+  for (const [name, figure] of Object.entries(unrigReport.figures)) {
+    const one = {name, lines: figure.csv().trim().split('\n').length, buttons: figure.bar.querySelectorAll('button').length};
+    if (figure.svg) {
+      const svg = figure.svg(), canvas = await unrigDrawing.painted(svg), text = unrigDrawing.text_of(svg);
+      const pixels = canvas.getContext('2d').getImageData(0, 0, canvas.width, canvas.height).data;
+      const colours = new Set();
+      for (let i = 0; i < pixels.length; i += 4) colours.add((pixels[i] << 16) + (pixels[i + 1] << 8) + pixels[i + 2]);
+      const parsed = new DOMParser().parseFromString(text, 'image/svg+xml');
+      Object.assign(one, {colours: colours.size, corner: [...pixels.slice(0, 4)], sound: !parsed.querySelector('parsererror'), curves: parsed.querySelectorAll('polyline, circle, image, .bar').length, broken: /NaN|Infinity|undefined/.test(text)});
+    }
+    found.push(one);
+  }
+  document.body.textContent = 'FOUND' + JSON.stringify({complaints, figures: found}) + 'END';
+});
+</script></body>)";
+
+TEST(ReportInABrowser, EveryFigureIsSavedAsPictureAndAsTable) {
+  const std::string browser = chromium();
+  if (browser.empty()) GTEST_SKIP() << "no Chromium on this machine; sample_data/setup.sh --optional installs it";
+  const TemporaryDirectory directory;
+  const json trial = {{"unrig", "trial"}, {"seed", 7}, {"noise", {{"gauge", 0.03}, {"unit", "N"}}}, {"recordings", json::array()}, {"nulls", 4}, {"false_alarms", 1}, {"wrong_names", 0}, {"misses", 0}, {"confusion", {{"nothing", {{"nothing", 4}}}}},
+                      {"effects", {{{"effect", "tank-wave"}, {"hidden", 3}, {"found", 1}, {"equivalent", 0}, {"smallest_found", 4.5}, {"found_nine_in_ten_from", nullptr}}}}, {"trials", json::array()}};
+  const std::string report = directory.path("report.html"), dom = directory.path("dom.html"), log = directory.path("log.txt");
+  ASSERT_EQ(test::run_unrig(directory, {"report", directory.file("diagnosis.json", test::made_up_diagnosis().dump()), directory.file("trial.json", trial.dump()), "-o", report}).status, 0);
+  const std::string page = replaced(read_text(report), "<meta charset=\"utf-8\">", std::string("<meta charset=\"utf-8\">") + listen);
+  ASSERT_EQ(browse(browser, directory, directory.file("probed.html", replaced(page, "</body>", save_figures)), "--window-size=1200,900 --virtual-time-budget=60000 --dump-dom", dom, log), 0) << read_text(log);
+  const std::string text = read_text(dom);
+  const std::size_t first = text.find("FOUND{"), last = text.rfind("}END");
+  ASSERT_TRUE(first != std::string::npos && last != std::string::npos) << text.substr(0, 2000) << read_text(log);
+  const json found = json::parse(text.substr(first + 5, last - first - 4));
+  EXPECT_EQ(found["complaints"], json::array());
+  std::size_t pictures = 0;
+  for (const json& figure : found["figures"]) {
+    EXPECT_GE(figure["lines"], 2) << figure;
+    EXPECT_GE(figure["buttons"], figure.contains("sound") ? 3 : 1) << figure;
+    if (!figure.contains("sound")) continue;
+    ++pictures;
+    EXPECT_EQ(figure["sound"], true) << figure;
+    EXPECT_EQ(figure["broken"], false) << figure;
+    EXPECT_GE(figure["curves"], 1) << figure;
+    EXPECT_GT(figure["colours"], 5) << figure;
+    EXPECT_EQ(figure["corner"], json({255, 255, 255, 255})) << "on white paper: " << figure;
+  }
+  EXPECT_EQ(pictures, 4u + 2u + 1u) << "plots, maps, bars";
 }
 
 /// Behind the page's own script: what became of the labels of the axes.

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <cstdint>
 #include <filesystem>
+#include <map>
 
 #include <fmt/format.h>
 
@@ -84,7 +85,75 @@ TEST(Report, ShowsEveryResultOfTheChain) {
   EXPECT_EQ((*indicial)["series"][1]["name"], "Wagner (exact)");
   ASSERT_TRUE(plot_titled(data, "Spectra of the free decays"));
   EXPECT_EQ((*plot_titled(data, "Spectra of the free decays"))["marks"].size(), 2u);
-  ASSERT_TRUE(plot_titled(data, "Gauge and the load of a rigid rig"));
+  const json* load = plot_titled(data, "Gauge and the load of a rigid rig");
+  ASSERT_TRUE(load);
+  // The inertial load goes far beyond the scale, which is the gauge's and the circulatory load's.
+  ASSERT_TRUE(load->contains("y_range"));
+  double largest = 0, largest_reading = 0;
+  for (const json& v : (*load)["series"][1]["v"]) largest = std::max(largest, v.get<double>());
+  for (const json& v : (*load)["series"][0]["v"]) largest_reading = std::max(largest_reading, v.get<double>());
+  EXPECT_GT(largest, 2 * (*load)["y_range"][1].get<double>());
+  EXPECT_GT((*load)["y_range"][1], largest_reading);
+
+  // Spectra end behind the last mode, each marked: the modes of the water pluck are those that apparent-mass finds in it.
+  const json* spectra = plot_titled(data, "Spectra before and after the correction");
+  ASSERT_TRUE(spectra && spectra->contains("marks"));
+  EXPECT_EQ((*spectra)["log_x"], true);
+  EXPECT_LE((*spectra)["x"].back().get<double>(), 1.31 * (*spectra)["marks"].back()["x"].get<double>());
+  const double wet = json::parse(read_text(directory.path("apparent.json")))["wet"]["frequency"];
+  for (const json& block : data["blocks"])
+    if (block["type"] == "plot" && block["title"] == "gauge: spectra before and after") {
+      ASSERT_TRUE(block.contains("marks"));
+      EXPECT_GE(block["marks"].size(), 4u);
+    }
+  // The head: the tow tank's numbers by hand, U c rho / mu and pi f c / U, in still water.
+  const json head = data["head"], runs = head["conditions"]["rows"];
+  ASSERT_EQ(runs.size(), 3u) << "the corrected step is one of the fit's: it is told once";
+  EXPECT_EQ(runs[2][1], "step");
+  constexpr double chord = 6 * 0.0254, speed = 0.6096;
+  EXPECT_NEAR(std::stod(runs[2][6].get<std::string>()), speed * chord * 998.2 / 1.0016e-3, 100);
+  EXPECT_NEAR(std::stod(runs[2][5].get<std::string>()), 3.14159265 * wet * chord / speed, 0.006);
+  EXPECT_EQ(head["rigs"].size(), 1u);
+  EXPECT_EQ(head["made"].size(), 3u) << "fit, apparent-mass, correct, each once";
+  EXPECT_EQ(head["date"].get<std::string>().size(), std::string("2026-01-01").size());
+}
+
+TEST(Report, ShowsTheIndicialResponsesOfSeveralStepsTogether) {
+  const TemporaryDirectory directory;
+  const std::string header = "semichords,indicial,indicial_std\n", output = directory.path("report.html");
+  const std::string one = directory.file("one.csv", header + "0.5,0.5,0.01\n1,0.6,0.01\n2,0.8,0.01\n"), two = directory.file("two.csv", header + "1,0.6,0.02\n3,0.8,0.04\n");
+  ASSERT_EQ(run_unrig(directory, {"report", one, two, "-o", output}).status, 0);
+  const json data = page_data(output);
+  const json* plot = plot_titled(data, "Indicial responses of all steps");
+  ASSERT_TRUE(plot);
+  EXPECT_EQ((*plot)["x"], json({0.5, 1.0, 2.0, 3.0}));
+  EXPECT_EQ((*plot)["series"][0]["v"], json::parse("[0.5, 0.6, 0.8, null]"));
+  EXPECT_EQ((*plot)["series"][1]["v"], json::parse("[null, 0.6, 0.7, 0.8]")) << "straight lines between points, and nothing beyond them";
+  EXPECT_EQ((*plot)["series"][1]["std"], json::parse("[null, 0.02, 0.03, 0.04]"));
+  ASSERT_EQ(run_unrig(directory, {"report", one, "-o", output}).status, 0);
+  EXPECT_FALSE(plot_titled(page_data(output), "Indicial responses of all steps"));
+}
+
+TEST(Report, TellsALawThatWasFound) {
+  const TemporaryDirectory directory;
+  json diagnosis = made_up_diagnosis();
+  diagnosis["missing"] = {{{"effect", "law"}, {"class", "damping"}, {"probability", 0.99}, {"equation", "not shown"}, {"parameters", {{{"name", "law.c"}, {"value", 1.23}, {"std_error", 0.02}, {"unit", "N"}}, {{"name", "law.p"}, {"value", 1.93}, {"std_error", 0.04}, {"unit", "1"}}}},
+                           {"law", {{"acts_on", "normal"}, {"class", "damping"}, {"force", "-c * abs(v)^p * sign(v)"}, {"memory", "v - z"}, {"learnt_on", {{"v", {-0.31, 0.28, "m/s"}}}},
+                                    {"rivals", {{{"force", "-c * v"}, {"distance_sigma", 14.2}, {"log_odds", 210.5}}, {{"force", "-c * v^3"}, {"distance_sigma", 3.1}, {"log_odds", 20.0}}}}}}}};
+  const std::string output = directory.path("report.html");
+  ASSERT_EQ(run_unrig(directory, {"report", directory.file("law.json", diagnosis.dump()), "-o", output}).status, 0);
+  const json data = page_data(output);
+  const std::vector<json> equations = blocks(data, "equation");
+  ASSERT_EQ(equations.size(), 2u);
+  EXPECT_EQ(equations[0]["text"], "F = -c * abs(v)^p * sign(v)");
+  EXPECT_EQ(equations[1]["text"], "z' = v - z");
+  EXPECT_THAT(blocks(data, "text")[1]["text"].get<std::string>(), ::testing::AllOf(HasSubstr("damping"), HasSubstr("calibration element")));
+  std::map<std::string, json> rows;
+  for (const json& table : blocks(data, "table")) rows[table["title"]] = table["rows"];
+  EXPECT_EQ(rows["Learnt on"], json::parse(R"([["v", "-0.31", "0.28", "m/s"]])"));
+  EXPECT_EQ(rows["Rivals of the law"], json::parse(R"([["-c * v", "14.2", "210.5"], ["-c * v^3", "3.1", "20"]])"));
+  EXPECT_EQ(rows["Parameters of what was missing"][0], json::parse(R"(["law", "law.c", "1.230 ± 0.020", "N"])"));
+  EXPECT_EQ(rows["Parameters of what was missing"][1][2], "1.930 ± 0.040");
 }
 
 /// A mode of 5 Hz on a mount that is shaken, which reads 1000 N/m, under a load that steps from 0 to `load` [N] half-way.
@@ -256,6 +325,15 @@ TEST(Report, ShowsATrial) {
   EXPECT_EQ(tables[0]["header"], json({"hidden", "nothing", "tank-wave", "unexplained"}));
   EXPECT_EQ(tables[0]["rows"][1], json({"tank-wave", "1", "1", "1"}));
   EXPECT_EQ(tables[1]["rows"][0], json({"tank-wave", "1", "3", "0", "4.5", "—"}));
+  // Wilson's interval of 1 of 3 is 6.15 to 79.23 %, of 0 of 1 it is 0 to 79.35 % (Agresti and Coull, American Statistician 52 (1998) 119, give the formula).
+  const std::vector<json> bars = blocks(data, "bars");
+  ASSERT_EQ(bars.size(), 1u);
+  ASSERT_EQ(bars[0]["rows"].size(), 2u);
+  EXPECT_NEAR(bars[0]["rows"][0]["low"].get<double>(), 0.0615, 1e-4);
+  EXPECT_NEAR(bars[0]["rows"][0]["high"].get<double>(), 0.7923, 1e-4);
+  EXPECT_EQ(bars[0]["rows"][1]["name"], "false alarm");
+  EXPECT_NEAR(bars[0]["rows"][1]["low"].get<double>(), 0, 1e-12);
+  EXPECT_NEAR(bars[0]["rows"][1]["high"].get<double>(), 0.7935, 1e-4);
   result["false_alarms"] = 1;
   ASSERT_EQ(run_unrig(directory, {"report", directory.file("trial.json", result.dump()), "-o", output}).status, 0);
   EXPECT_EQ(page_data(output)["verdicts"][0]["tone"], "open");
@@ -280,6 +358,15 @@ TEST(Report, ShowsADiagnosis) {
   EXPECT_THAT(blocks(page_data(output), "map")[0]["caption"].get<std::string>(), HasSubstr("Higher frequencies hold nothing but noise."));
   EXPECT_EQ(blocks(data, "plot").size(), 4u);
   EXPECT_EQ(blocks(data, "table").size(), 4u);
+  // The mismatch, 0.2 to 1.4 s and 2 to 4 Hz, is boxed wherever time or frequency is an axis.
+  const json time = {{"from", 0.2}, {"to", 1.4}, {"name", "mismatch"}}, frequency = {{"from", 2.0}, {"to", 4.0}, {"name", "mismatch"}};
+  EXPECT_EQ((*plot_titled(data, "recording and models"))["boxes"], json::array({time}));
+  EXPECT_EQ((*plot_titled(data, "residuals"))["boxes"], json::array({time}));
+  EXPECT_EQ((*plot_titled(data, "spectra of the residual before and after"))["boxes"], json::array({frequency}));
+  EXPECT_EQ(maps[0]["boxes"], json::parse(R"([{"from": 0.2, "to": 1.4, "low": 2.0, "high": 4.0}])"));
+  std::vector<std::string> chapters;
+  for (const json& heading : blocks(data, "heading")) chapters.push_back(heading["title"]);
+  EXPECT_THAT(chapters, ::testing::ElementsAre("Where it is", "What it is", "Before and after", "What else was tried")) << "no chapter of which the file says nothing";
 }
 
 TEST(Report, ADiagnosisShowsItsRecordingsAndBothModels) {
@@ -348,7 +435,7 @@ TEST(Report, SaysWhichRecordingsItDoesNotFindAndFindsThemInAFolder) {
   EXPECT_TRUE(blocks(page_data(output), "plot").empty());
   const Finished with = run_unrig(directory, {"report", moved, "--data", test::null_campaign(""), "-o", output});
   EXPECT_THAT(with.err, IsEmpty());
-  EXPECT_EQ(blocks(page_data(output), "plot").size(), 3u * 3 + 2);  // per run recording, residual, spectra; the step's angle twice more
+  EXPECT_EQ(blocks(page_data(output), "plot").size(), 3u * 5 + 2 + 4);  // per run recording, residual, spectra, autocorrelation, quantiles; the step's angle twice more; response, phase and two shapes of the rig
 }
 
 TEST(Report, SaysWhereARecordingIsNotTheOneThatWasFitted) {

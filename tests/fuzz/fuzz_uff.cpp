@@ -13,5 +13,10 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
       if (channel.value.size() > size) std::abort();
   } catch (const unrig::InputError&) {
   }
+  try {
+    for (const unrig::UffFunction& f : unrig::read_uff_functions({reinterpret_cast<const char*>(data), size}, "fuzz.uff"))
+      if (f.value.size() > size || f.abscissa.size() != f.value.size()) std::abort();
+  } catch (const unrig::InputError&) {
+  }
   return 0;
 }

@@ -71,6 +71,58 @@ TEST(Uff, ReadsEachLayoutOfRealNumbers) {
     }
 }
 
+TEST(Uff, ReadsComplexFunctionsWithWhatTheyAre) {
+  const Values f{1, 1.125, 1.25, 1.5, 1.75}, re{1, -2.5, 3.25e-3, 4e10, -5}, im{-1, 2, 0, 1e-3, 8};
+  for (const bool is_double : {false, true})
+    for (const int even : {1, 0}) {
+      const int type = is_double ? 6 : 5;
+      std::string text = records(type, f.size(), even, "    58");
+      const int per_line = even ? (is_double ? 2 : 3) : (is_double ? 1 : 2);  // points
+      for (std::size_t k = 0; k < f.size(); ++k) {
+        if (!even) text += fmt::format("{:13.5E}", f[k]);
+        for (const double v : {re[k], im[k]}) text += is_double ? fmt::format("{:20.12E}", v) : fmt::format("{:13.5E}", v);
+        if (static_cast<int>(k) % per_line == per_line - 1 || k + 1 == f.size()) text += "\n";
+      }
+      std::vector<std::string> files{text + "    -1\n"};
+      for (const bool big : {false, true}) {
+        TdmsBytes data(big);
+        const auto put = [&](double v) { is_double ? data.number(v) : data.number(static_cast<float>(v)); };
+        for (std::size_t k = 0; k < f.size(); ++k) {
+          if (!even) put(f[k]);
+          put(re[k]);
+          put(im[k]);
+        }
+        files.push_back(records(type, f.size(), even, fmt::format("    58b{:6}{:6}{:12}{:12}{:6}{:6}{:12}{:12}", big ? 2 : 1, 2, 11, data.bytes().size(), 0, 0, 0, 0)) + data.bytes() + "\n    -1\n");
+      }
+      for (std::string file : files) {
+        // A frequency response function, struck at 12:-Y.
+        const std::string entity = fmt::format("{:5}{:10}{:5}{:10} {:10}{:10}{:4} {:10}{:10}{:4}", 1, 0, 1, 0, "RIG", 3, 3, "NONE", 0, 0), struck = fmt::format("{:5}{:10}{:5}{:10} {:10}{:10}{:4} {:10}{:10}{:4}", 4, 0, 1, 0, "RIG", 3, 3, "NONE", 12, -2);
+        file.replace(file.find(entity), entity.size(), struck);
+        const std::vector<UffFunction> functions = read_uff_functions(file, "f.uff");
+        ASSERT_EQ(functions.size(), 1u);
+        const UffFunction& found = functions[0];
+        EXPECT_EQ(found.type, 4);
+        EXPECT_EQ(found.node, 3);
+        EXPECT_EQ(found.direction, 3);
+        EXPECT_EQ(found.reference_node, 12);
+        EXPECT_EQ(found.reference_direction, -2);
+        EXPECT_EQ(found.unit, "V");
+        ASSERT_EQ(found.value.size(), f.size());
+        for (std::size_t k = 0; k < f.size(); ++k) {
+          EXPECT_NEAR(found.value[k].real(), re[k], 1e-6 * std::abs(re[k]));
+          EXPECT_NEAR(found.value[k].imag(), im[k], 1e-6 * std::abs(im[k]));
+          EXPECT_NEAR(found.abscissa[k], even ? 0.5 + 0.002 * static_cast<double>(k) : f[k], 1e-12);
+        }
+        try {
+          read_uff(file, "f.uff");
+          FAIL() << "it holds no recording";
+        } catch (const InputError& e) {
+          EXPECT_THAT(e.what(), HasSubstr("new rig --from impact-test"));
+        }
+      }
+    }
+}
+
 TEST(Uff, SkipsOtherDatasetsAndTellsRepeatedNamesApart) {
   const std::string units = "    -1\n   164\n  1  SI\n  1.0\n    -1\n";
   const Recording r = read_uff(units + text_58(2, 1, {}, y) + text_58(2, 1, {}, y), "f");
