@@ -1,0 +1,135 @@
+#include "fit/propose/fitted_explanation.h"
+
+#include <Eigen/Eigenvalues>
+#include <Eigen/QR>
+#include <algorithm>
+#include <cmath>
+
+#include "core/effects/effect.h"
+#include "core/law/law_effect.h"
+#include "fit/effect_option.h"
+#include "fit/fit_description.h"
+#include "fit/search/effect_search.h"
+#include "fit/uncertainty/undetermined.h"
+
+namespace unrig {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+namespace {
+
+std::vector<std::size_t> free_unknowns(const JointProblem& joint, bool shared) {
+  std::vector<std::size_t> free;
+  for (std::size_t i = 0; i < joint.unknowns().size(); ++i)
+    if (const Unknown& u = joint.unknowns()[i]; !u.held && (u.run < 0) == shared) free.push_back(i);
+  return free;
+}
+
+MatrixXd information_in(const JointProblem& joint) {
+  const JointProblem::Linearisation lin = joint.linearise();
+  const std::vector<std::size_t> shared = free_unknowns(joint, true), own = free_unknowns(joint, false);
+  MatrixXd j = lin.jacobian(Eigen::all, shared);
+  if (!own.empty()) {
+    const MatrixXd k = lin.jacobian(Eigen::all, own);
+    j -= k * Eigen::ColPivHouseholderQR<MatrixXd>(k).solve(j);
+  }
+  MatrixXd h = j.transpose() * j;
+  for (std::size_t i = 0; i < shared.size(); ++i) {
+    const Unknown& u = joint.unknowns()[shared[i]];
+    const double open = ignorance(joint.parameter(u), u.value);
+    if (open > 0) h(static_cast<Index>(i), static_cast<Index>(i)) += 1 / (open * open);
+  }
+  return h;
+}
+
+}  // namespace
+
+FittedExplanation::FittedExplanation(const Explanation& explanation, const Rivals& rivals, const std::function<void(const std::string&)>& progress) : explanation_(explanation) {
+  problem_.rig = rivals.rig;
+  problem_.runs = rivals.runs;
+  problem_.circulation = rivals.circulation;
+  problem_.effects = explanation.effects;
+  problem_.progress = progress;
+  for (const Law& law : explanation.laws) {
+    add_law(problem_.rig, law);
+    problem_.effects.push_back(law.id());
+  }
+  refuse_idle("the diagnosis", problem_.effects, problem_.rig, problem_.runs);
+  const auto model = std::make_shared<const AeroelasticModel>(model_of(problem_.rig, problem_.runs, problem_.circulation, problem_.effects));
+  arrival_ = std::make_unique<Arrival>(problem_.effects.empty() ? arrive(problem_, model) : arrive_at_effects(problem_));
+  no_answer_ = describe_fit(*arrival_, problem_, Settle::steps).no_answer;
+}
+
+double FittedExplanation::log_noise() const {
+  double sum = 0;
+  for (std::size_t r = 0; r < joint().runs().size(); ++r) {
+    const RunResidual& run = joint().runs()[r];
+    const double samples = static_cast<double>(run.observations()), left = run.evaluate(joint().theta(r), Partials::none).chi2 / static_cast<double>(run.degrees_of_freedom());
+    sum += samples * (std::log(run.noise(0)) + 0.5 * std::log(left));
+  }
+  return sum;
+}
+
+void FittedExplanation::settle(const FittedExplanation& reference) {
+  for (std::size_t r = 0; r < joint().runs().size(); ++r) {
+    const RunResidual& known = reference.joint().runs()[r];
+    if (&reference != this) {
+      joint().runs()[r].keep_noise_of(known);
+      continue;
+    }
+    RunResidual& run = joint().runs()[r];
+    run.temper(1);
+    const double left = run.evaluate(joint().theta(r), Partials::none).chi2 / static_cast<double>(run.degrees_of_freedom());
+    run.temper(std::sqrt(std::max(1.0, left)));
+  }
+  solve(*arrival_);
+  uncertainty_ = estimate_uncertainty(joint());
+  chi2_ = joint().chi2();
+  information_ = information_in(joint());
+}
+
+int FittedExplanation::variables() const {
+  int count = 0;
+  for (const RunResidual& run : joint().runs()) count += static_cast<int>(run.linear_unknowns());
+  for (const Unknown& u : joint().unknowns()) count += u.held ? 0 : 1;
+  return count;
+}
+
+VectorXd FittedExplanation::drawn_theta(const CandidateRun& candidate, std::mt19937_64& random) const {
+  VectorXd theta = this->theta(candidate);
+  const MatrixXd covariance = uncertainty_.covariance();
+  const Eigen::SelfAdjointEigenSolver<MatrixXd> eigen(covariance);
+  std::normal_distribution<double> normal;
+  VectorXd draw(covariance.rows());
+  for (Index k = 0; k < draw.size(); ++k) draw[k] = normal(random) * std::sqrt(std::max(0.0, eigen.eigenvalues()[k]));
+  const VectorXd off = eigen.eigenvectors() * draw;
+  for (std::size_t k = 0; k < uncertainty_.free.size(); ++k) {
+    const Unknown& u = joint().unknowns()[static_cast<std::size_t>(uncertainty_.free[k])];
+    if (u.run >= 0 && u.run != static_cast<int>(candidate.like)) continue;
+    const auto [lower, upper] = bounds_at(model(), u.parameter, u.value);
+    theta[u.parameter] = std::clamp(theta[u.parameter] + off[static_cast<Index>(k)], lower, upper);
+  }
+  return theta;
+}
+
+FittedExplanation::Refit FittedExplanation::refit(const RunResidual& added, std::size_t like) const {
+  std::vector<RunResidual> all = joint().runs();
+  all.push_back(added);
+  JointProblem with(model(), std::move(all));
+  const int last = static_cast<int>(joint().runs().size());
+  for (Unknown& u : with.unknowns()) {
+    const int run = u.run == last ? static_cast<int>(like) : u.run;
+    for (const Unknown& known : joint().unknowns())
+      if (known.parameter == u.parameter && known.run == run) u = {known.parameter, u.run, known.value, known.held, known.why_held};
+  }
+  JointProblem::SolveOptions options;
+  options.iterations = 60;
+  options.restarts = true;
+  options.most_evaluations = 200;
+  const JointProblem::Summary summary = with.solve(options);
+  return {summary.converged && std::isfinite(summary.chi2), summary.chi2 - chi2_};
+}
+
+}  // namespace unrig
