@@ -73,7 +73,7 @@ double angle_noise(const FittedExplanation& model, const CandidateRun& candidate
 /// A run near the parameters of a fit, with what is its own alone eliminated: difference and slopes in units of the noise.
 struct Local {
   VectorXd residual;
-  MatrixXd slope;  // over the free unknowns that all runs share
+  MatrixXd slope;  // over FittedExplanation::shared
   double chi2 = 0;
 };
 
@@ -81,13 +81,7 @@ Local local(const FittedExplanation& model, const RunResidual& run, const Candid
   const RunResidual::Sensitivity s = run.sensitivity(model.theta(candidate));
   Index rows = 0, at = 0;
   for (const auto& channel : s.channels) rows += channel.residual.size();
-  const std::vector<Unknown>& unknowns = model.joint().unknowns();
-  std::vector<Index> shared, own;
-  for (const Unknown& u : unknowns) {
-    if (u.held) continue;
-    if (u.run < 0) shared.push_back(u.parameter);
-    else if (u.run == static_cast<int>(candidate.like)) own.push_back(u.parameter);
-  }
+  const std::vector<Index>&shared = model.shared(), own = model.own(candidate.like);
   Local out{VectorXd(rows), MatrixXd(rows, static_cast<Index>(shared.size())), 0};
   MatrixXd of_its_own(rows, static_cast<Index>(own.size()));
   for (const auto& channel : s.channels) {

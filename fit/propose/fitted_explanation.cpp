@@ -20,24 +20,30 @@ using Eigen::VectorXd;
 
 namespace {
 
-std::vector<std::size_t> free_unknowns(const JointProblem& joint, bool shared) {
-  std::vector<std::size_t> free;
-  for (std::size_t i = 0; i < joint.unknowns().size(); ++i)
-    if (const Unknown& u = joint.unknowns()[i]; !u.held && (u.run < 0) == shared) free.push_back(i);
-  return free;
+/// Whether one more run may move it: parameters of effects that the runs at hand leave open too.
+bool may_move(const JointProblem& joint, const Unknown& u) { return !u.held || belongs_to_an_effect(joint.parameter(u).name); }
+
+const Unknown* find(const std::vector<Unknown>& unknowns, Index parameter, int run) {
+  const auto found = std::find_if(unknowns.begin(), unknowns.end(), [&](const Unknown& u) { return u.parameter == parameter && u.run == run; });
+  return found == unknowns.end() ? nullptr : &*found;
 }
 
-MatrixXd information_in(const JointProblem& joint) {
+/// Information on the unknowns that all runs share, and which parameters they are.
+MatrixXd information_in(const JointProblem& joint, std::vector<Index>& parameters) {
   const JointProblem::Linearisation lin = joint.linearise();
-  const std::vector<std::size_t> shared = free_unknowns(joint, true), own = free_unknowns(joint, false);
+  std::vector<std::size_t> shared, own;
+  for (std::size_t i = 0; i < joint.unknowns().size(); ++i)
+    if (const Unknown& u = joint.unknowns()[i]; may_move(joint, u)) (u.run < 0 ? shared : own).push_back(i);
   MatrixXd j = lin.jacobian(Eigen::all, shared);
   if (!own.empty()) {
     const MatrixXd k = lin.jacobian(Eigen::all, own);
     j -= k * Eigen::ColPivHouseholderQR<MatrixXd>(k).solve(j);
   }
   MatrixXd h = j.transpose() * j;
+  parameters.clear();
   for (std::size_t i = 0; i < shared.size(); ++i) {
     const Unknown& u = joint.unknowns()[shared[i]];
+    parameters.push_back(u.parameter);
     const double open = ignorance(joint.parameter(u), u.value);
     if (open > 0) h(static_cast<Index>(i), static_cast<Index>(i)) += 1 / (open * open);
   }
@@ -87,7 +93,7 @@ void FittedExplanation::settle(const FittedExplanation& reference) {
   solve(*arrival_);
   uncertainty_ = estimate_uncertainty(joint());
   chi2_ = joint().chi2();
-  information_ = information_in(joint());
+  information_ = information_in(joint(), shared_);
 }
 
 int FittedExplanation::variables() const {
@@ -114,22 +120,52 @@ VectorXd FittedExplanation::drawn_theta(const CandidateRun& candidate, std::mt19
   return theta;
 }
 
-FittedExplanation::Refit FittedExplanation::refit(const RunResidual& added, std::size_t like) const {
-  std::vector<RunResidual> all = joint().runs();
-  all.push_back(added);
+std::vector<Index> FittedExplanation::own(std::size_t run) const {
+  std::vector<Index> parameters;
+  for (const Unknown& u : joint().unknowns())
+    if (u.run == static_cast<int>(run) && may_move(joint(), u)) parameters.push_back(u.parameter);
+  return parameters;
+}
+
+FittedExplanation::Refit FittedExplanation::search(std::vector<RunResidual> all, const std::vector<Unknown>& start) const {
   JointProblem with(model(), std::move(all));
-  const int last = static_cast<int>(joint().runs().size());
-  for (Unknown& u : with.unknowns()) {
-    const int run = u.run == last ? static_cast<int>(like) : u.run;
-    for (const Unknown& known : joint().unknowns())
-      if (known.parameter == u.parameter && known.run == run) u = {known.parameter, u.run, known.value, known.held, known.why_held};
-  }
+  for (Unknown& u : with.unknowns())
+    if (const Unknown* known = find(start, u.parameter, u.run)) u = *known, u.held = !may_move(joint(), *known);
   JointProblem::SolveOptions options;
   options.iterations = 60;
   options.restarts = true;
   options.most_evaluations = 200;
   const JointProblem::Summary summary = with.solve(options);
-  return {summary.converged && std::isfinite(summary.chi2), summary.chi2 - chi2_};
+  return {summary.converged && std::isfinite(summary.chi2), summary.chi2 - chi2_, with.unknowns()};
+}
+
+FittedExplanation::Refit FittedExplanation::refit(const RunResidual& added, std::size_t like, const std::vector<Unknown>& start) const {
+  std::vector<RunResidual> all = joint().runs();
+  all.push_back(added);
+  if (!start.empty()) return search(std::move(all), start);
+  std::vector<Unknown> unknowns = joint().unknowns();
+  for (Unknown u : joint().unknowns()) {
+    if (u.run != static_cast<int>(like)) continue;
+    u.run = static_cast<int>(joint().runs().size());
+    unknowns.push_back(u);
+  }
+  return search(std::move(all), unknowns);
+}
+
+FittedExplanation::Refit FittedExplanation::refit_anew(const RunResidual& added, const Run& as_read) const {
+  FitProblem problem = problem_;
+  problem.progress = nullptr;
+  problem.runs.push_back(as_read);
+  const Arrival anew = problem.effects.empty() ? arrive(problem, std::make_shared<const AeroelasticModel>(model_of(problem.rig, problem.runs, problem.circulation))) : arrive_at_effects(problem);
+  if (anew.model->parameters().size() != model().parameters().size()) return {};  // the added run asks for more modes
+  std::vector<RunResidual> all = joint().runs();
+  all.push_back(added);
+  for (std::size_t r = 0; r < all.size(); ++r)
+    if (anew.joint.runs()[r].linear_unknowns() == all[r].linear_unknowns()) all[r].start_from(anew.joint.runs()[r]);
+  std::vector<Unknown> unknowns = anew.joint.unknowns();
+  for (Unknown& u : unknowns)  // what the runs at hand do not determine of the rig stays held
+    if (const Unknown* known = find(joint().unknowns(), u.parameter, u.run); known && !may_move(joint(), *known)) u = *known;
+  return search(std::move(all), unknowns);
 }
 
 }  // namespace unrig

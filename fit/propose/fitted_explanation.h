@@ -34,8 +34,11 @@ class FittedExplanation {
   /// Takes over the noise of the runs, as much more as `reference` leaves of each beyond it, and searches again; then chi2 and covariance are known.
   void settle(const FittedExplanation& reference);
   double chi2() const { return chi2_; }
-  /// What the runs at hand, and what everybody knows of such numbers, say of the unknowns that all runs share and that are not held, those of single runs eliminated.
+  /// What the runs at hand, and what everybody knows of such numbers, say of the unknowns that all runs share, those of single runs eliminated; in the order of `shared`.
   const Eigen::MatrixXd& information() const { return information_; }
+  /// Parameters that one more run may move: those that all runs share, and those that a run has of its own.
+  const std::vector<Eigen::Index>& shared() const { return shared_; }
+  std::vector<Eigen::Index> own(std::size_t run) const;
   /// Unknowns that are not held, the runs' linear ones included.
   int variables() const;
 
@@ -44,19 +47,26 @@ class FittedExplanation {
   /// The same with the unknowns drawn from their joint normal distribution, inside their bounds.
   Eigen::VectorXd drawn_theta(const CandidateRun& candidate, std::mt19937_64& random) const;
 
-  /// chi-square of all runs at their least with `added` beside them, less that without it, and whether the search arrived there.
+  /// chi-square of all runs at their least with another beside them, less that without it. Parameters of effects that the runs at hand leave open are free in it.
   struct Refit {
     bool arrived = false;
     double chi2 = 0;
+    std::vector<Unknown> unknowns;  ///< where it ended; those of the added run behind the others
   };
-  Refit refit(const RunResidual& added, std::size_t like) const;
+  /// Searched from `start`, or from where the fit to the runs at hand stands. `like`: the run at hand whose own parameters the added one then starts from.
+  Refit refit(const RunResidual& added, std::size_t like, const std::vector<Unknown>& start = {}) const;
+  /// All the way as `unrig fit` goes, to the runs at hand and to `as_read`, the added run with its noise; from there as refit.
+  Refit refit_anew(const RunResidual& added, const Run& as_read) const;
 
  private:
+  Refit search(std::vector<RunResidual> all, const std::vector<Unknown>& start) const;
+
   Explanation explanation_;
   FitProblem problem_;  // the arrival looks at its runs
   std::unique_ptr<Arrival> arrival_;
   ParameterUncertainty uncertainty_;
   Eigen::MatrixXd information_;
+  std::vector<Eigen::Index> shared_;
   std::string no_answer_;
   double chi2_ = 0;
 };

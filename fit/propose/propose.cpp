@@ -75,30 +75,45 @@ class Search {
     return outcome;
   }
 
-  /// Log odds of the true explanation, both refitted; nothing where a search did not arrive.
-  std::optional<double> by_refit(std::size_t truth, std::size_t other, std::size_t c, std::size_t draw, ExpectedOutcome& outcome) const {
-    const CandidateRun& candidate = candidates_[c];
-    std::mt19937_64 random = noise_of(problem_, c, draw);
-    const VectorXd theta = draw == 0 ? fits_[truth]->theta(candidate) : fits_[truth]->drawn_theta(candidate, random);
-    const ImaginedRun run = imagined(*fits_[truth], candidate, theta, random);
-    double chi2[2] = {0, 0};
-    bool arrived = true;
-    for (const std::size_t k : {0, 1}) {
-      const FittedExplanation& fit = *fits_[k == 0 ? truth : other];
-      const FittedExplanation::Refit refit = fit.refit(residual_of(fit, run, candidate, draw == 0), candidate.like);
-      ++outcome.searches;
-      outcome.arrived += refit.arrived ? 1 : 0;
-      arrived = arrived && refit.arrived;
-      chi2[k] = refit.chi2;
+  /// A refit that leaves more than it should (of the true explanation beyond chance, of the other by what would decide) may have lost its way. It is searched anew, and the better of both counts. With
+  /// noise it starts from `end`, where that without noise ended.
+  FittedExplanation::Refit refitted(std::size_t of, const ImaginedRun& run, const CandidateRun& candidate, bool exact, double should_leave, std::vector<Unknown>& end, ExpectedOutcome& outcome) const {
+    const RunResidual added = residual_of(*fits_[of], run, candidate, exact);
+    FittedExplanation::Refit refit = fits_[of]->refit(added, candidate.like, end);
+    if (!refit.arrived || (exact && refit.chi2 > should_leave)) {
+      FittedExplanation::Refit anew = fits_[of]->refit_anew(added, run.noisy);
+      if (anew.arrived && (!refit.arrived || anew.chi2 < refit.chi2)) refit = std::move(anew);
     }
-    if (!arrived) return {};
-    return 0.5 * (chi2[1] - chi2[0]);
+    if (exact) end = refit.unknowns;
+    ++outcome.searches;
+    outcome.arrived += refit.arrived ? 1 : 0;
+    return refit;
+  }
+
+  /// Log odds of the true explanation, both refitted; nothing where a search did not arrive. `ends`: of the true one and of the other.
+  std::optional<double> by_refit(std::size_t truth, std::size_t other, std::size_t c, std::size_t draw, std::vector<Unknown>* ends, ExpectedOutcome& outcome) const {
+    const CandidateRun& candidate = candidates_[c];
+    const bool exact = draw == 0;
+    std::mt19937_64 random = noise_of(problem_, c, draw);
+    const VectorXd theta = exact ? fits_[truth]->theta(candidate) : fits_[truth]->drawn_theta(candidate, random);
+    const ImaginedRun run = imagined(*fits_[truth], candidate, theta, random);
+    // The readings that are read with noise leave as many as there are, within what chance leaves in one of a million; the angle of a turn always is.
+    const double read = static_cast<double>(run.exact.samples()) * ((exact ? 0.0 : static_cast<double>(fits_[truth]->joint().runs()[candidate.like].channels().size())) + (run.windows.empty() ? 0.0 : 1.0));
+    const double chance = read + 5 * std::sqrt(2 * read) + 5;
+    const FittedExplanation::Refit right = refitted(truth, run, candidate, exact, chance, ends[0], outcome);
+    const FittedExplanation::Refit wrong = refitted(other, run, candidate, exact, right.chi2 + 2 * enough_to_decide, ends[1], outcome);
+    if (!right.arrived || !wrong.arrived) return {};
+    if (right.chi2 > chance) {  // the truth is at hand, and the search did not find it
+      --outcome.arrived;
+      return {};
+    }
+    return 0.5 * (wrong.chi2 - right.chi2);
   }
 
   void refit(const Comparison& comparison, ExpectedOutcome& outcome) const {
     try {
-      outcome.refitted.first = by_refit(comparison.first, comparison.second, outcome.candidate, 0, outcome).value_or(ExpectedOutcome::unknown);
-      outcome.refitted.second = by_refit(comparison.second, comparison.first, outcome.candidate, 0, outcome).value_or(ExpectedOutcome::unknown);
+      outcome.refitted.first = by_refit(comparison.first, comparison.second, outcome.candidate, 0, outcome.ends.data(), outcome).value_or(ExpectedOutcome::unknown);
+      outcome.refitted.second = by_refit(comparison.second, comparison.first, outcome.candidate, 0, outcome.ends.data() + 2, outcome).value_or(ExpectedOutcome::unknown);
     } catch (const std::runtime_error& e) {
       outcome.failed = e.what();
     }
@@ -137,11 +152,12 @@ class Search {
     const auto draws = static_cast<std::size_t>(std::max(problem_.draws, 0));
     tell(fmt::format("drawing parameters and noise for {}", candidates_[best.candidate].what));
     std::vector<ExpectedOutcome> each(2 * draws);
+    for (ExpectedOutcome& one : each) one.ends = best.ends;
     std::vector<std::optional<double>> odds(2 * draws);
     in_parallel(2 * draws, [&](std::size_t k) {
       const bool first = k < draws;
       try {
-        odds[k] = by_refit(first ? comparison.first : comparison.second, first ? comparison.second : comparison.first, best.candidate, 1 + k, each[k]);
+        odds[k] = by_refit(first ? comparison.first : comparison.second, first ? comparison.second : comparison.first, best.candidate, 1 + k, each[k].ends.data() + (first ? 0 : 2), each[k]);
       } catch (const std::runtime_error&) {  // drawn parameters with which the model runs away
         each[k].searches += 1;
       }

@@ -1,4 +1,5 @@
 #pragma once
+#include <array>
 #include <cstdint>
 #include <functional>
 #include <limits>
@@ -6,6 +7,7 @@
 #include <utility>
 #include <vector>
 
+#include "fit/likelihood/joint_problem.h"
 #include "fit/propose/candidate_runs.h"
 #include "fit/propose/explanations.h"
 #include "fit/propose/limits.h"
@@ -29,6 +31,8 @@ struct ExpectedOutcome {
   std::pair<double, double> linear = {unknown, unknown};         ///< expected log odds of the first if it is true, of the second if that is; to first order
   std::pair<double, double> refitted = {unknown, unknown};       ///< the same, simulated without noise and both refitted; not a number where a refit did not arrive
   std::pair<std::vector<double>, std::vector<double>> drawn;     ///< log odds of the true one, simulated with noise and drawn parameters, where both refits arrived
+  /// Unknowns of the refits without noise: where the first is true, of the first and of the second; then where the second is.
+  std::array<std::vector<Unknown>, 4> ends;
   int searches = 0, arrived = 0;                                 ///< refits, and how many of them arrived
 
   bool was_refitted() const { return searches > 0; }
