@@ -96,6 +96,22 @@ void FittedExplanation::settle(const FittedExplanation& reference) {
   information_ = information_in(joint(), shared_);
 }
 
+bool FittedExplanation::adopt(const std::vector<Unknown>& better) {
+  const std::vector<Unknown> before = joint().unknowns();
+  for (Unknown& u : joint().unknowns())
+    if (const Unknown* known = find(better, u.parameter, u.run)) u.value = known->value, u.held = known->held;
+  solve(*arrival_);
+  const double chi2 = joint().chi2();
+  if (!(chi2 < chi2_ - clearly_less)) {
+    joint().unknowns() = before;
+    return false;
+  }
+  chi2_ = chi2;
+  uncertainty_ = estimate_uncertainty(joint());
+  information_ = information_in(joint(), shared_);
+  return true;
+}
+
 int FittedExplanation::variables() const {
   int count = 0;
   for (const RunResidual& run : joint().runs()) count += static_cast<int>(run.linear_unknowns());
@@ -133,8 +149,8 @@ FittedExplanation::Refit FittedExplanation::search(std::vector<RunResidual> all,
     if (const Unknown* known = find(start, u.parameter, u.run)) u = *known, u.held = !may_move(joint(), *known);
   JointProblem::SolveOptions options;
   options.iterations = 60;
-  options.restarts = true;
-  options.most_evaluations = 200;
+  options.precision = 0.1;  // standard errors: a hundredth of chi-square
+  options.most_evaluations = 100;
   const JointProblem::Summary summary = with.solve(options);
   return {summary.converged && std::isfinite(summary.chi2), summary.chi2 - chi2_, with.unknowns()};
 }

@@ -34,6 +34,8 @@ class FittedExplanation {
   /// Takes over the noise of the runs, as much more as `reference` leaves of each beyond it, and searches again; then chi2 and covariance are known.
   void settle(const FittedExplanation& reference);
   double chi2() const { return chi2_; }
+  /// Another run can only add to the least chi-square: a refit that leaves less shows that the fit to the runs at hand has missed it. Searches from where that refit ended; false where it finds no less.
+  bool adopt(const std::vector<Unknown>& better);
   /// What the runs at hand, and what everybody knows of such numbers, say of the unknowns that all runs share, those of single runs eliminated; in the order of `shared`.
   const Eigen::MatrixXd& information() const { return information_; }
   /// Parameters that one more run may move: those that all runs share, and those that a run has of its own.
@@ -57,6 +59,8 @@ class FittedExplanation {
   Refit refit(const RunResidual& added, std::size_t like, const std::vector<Unknown>& start = {}) const;
   /// All the way as `unrig fit` goes, to the runs at hand and to `as_read`, the added run with its noise; from there as refit.
   Refit refit_anew(const RunResidual& added, const Run& as_read) const;
+
+  static constexpr double clearly_less = 1;  ///< of chi-square
 
  private:
   Refit search(std::vector<RunResidual> all, const std::vector<Unknown>& start) const;

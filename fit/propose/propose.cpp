@@ -39,7 +39,27 @@ class Search {
  public:
   Search(const ProposeProblem& problem, const std::vector<CandidateRun>& candidates, const Fits& fits) : problem_(problem), candidates_(candidates), fits_(fits) {}
 
-  Comparison compare(std::size_t first, std::size_t second) {
+  Comparison compare(std::size_t first, std::size_t second) const {
+    constexpr int most = 3;
+    for (int round = 1;; ++round) {
+      Comparison comparison = refitted_comparison(first, second);
+      if (round < most && found_better_fits(comparison)) continue;
+      draw_for_the_best(comparison);
+      return comparison;
+    }
+  }
+
+ private:
+  /// Whether refits have shown that an explanation fits the runs at hand better than was known; then it does from now on.
+  bool found_better_fits(const Comparison& comparison) const {
+    bool found = false;
+    for (const ExpectedOutcome& outcome : comparison.outcomes)
+      for (const std::size_t end : {0, 1, 2, 3})
+        if (outcome.risen[end] < -FittedExplanation::clearly_less && fits_[end == 0 || end == 3 ? comparison.first : comparison.second]->adopt(outcome.ends[end])) found = true;
+    return found;
+  }
+
+  Comparison refitted_comparison(std::size_t first, std::size_t second) const {
     Comparison comparison{first, second, {}, {}};
     std::vector<ExpectedOutcome> all(candidates_.size());
     in_parallel(all.size(), [&](std::size_t c) { all[c] = to_first_order(first, second, c); });
@@ -48,11 +68,9 @@ class Search {
       else if (known_or_last(least_of(outcome.linear)) >= known_or_last(least_of(comparison.repeat.linear))) comparison.repeat = std::move(outcome);
     }
     refit_the_best(comparison);
-    draw_for_the_best(comparison);
     return comparison;
   }
 
- private:
   void tell(const std::string& what) const {
     if (problem_.progress) problem_.progress(what);
   }
@@ -77,21 +95,21 @@ class Search {
 
   /// A refit that leaves more than it should (of the true explanation beyond chance, of the other by what would decide) may have lost its way. It is searched anew, and the better of both counts. With
   /// noise it starts from `end`, where that without noise ended.
-  FittedExplanation::Refit refitted(std::size_t of, const ImaginedRun& run, const CandidateRun& candidate, bool exact, double should_leave, std::vector<Unknown>& end, ExpectedOutcome& outcome) const {
+  FittedExplanation::Refit refitted(std::size_t of, const ImaginedRun& run, const CandidateRun& candidate, bool exact, double should_leave, std::size_t end, ExpectedOutcome& outcome) const {
     const RunResidual added = residual_of(*fits_[of], run, candidate, exact);
-    FittedExplanation::Refit refit = fits_[of]->refit(added, candidate.like, end);
+    FittedExplanation::Refit refit = fits_[of]->refit(added, candidate.like, outcome.ends[end]);
     if (!refit.arrived || (exact && refit.chi2 > should_leave)) {
       FittedExplanation::Refit anew = fits_[of]->refit_anew(added, run.noisy);
       if (anew.arrived && (!refit.arrived || anew.chi2 < refit.chi2)) refit = std::move(anew);
     }
-    if (exact) end = refit.unknowns;
+    if (exact && refit.arrived) outcome.ends[end] = refit.unknowns, outcome.risen[end] = refit.chi2;
     ++outcome.searches;
     outcome.arrived += refit.arrived ? 1 : 0;
     return refit;
   }
 
-  /// Log odds of the true explanation, both refitted; nothing where a search did not arrive. `ends`: of the true one and of the other.
-  std::optional<double> by_refit(std::size_t truth, std::size_t other, std::size_t c, std::size_t draw, std::vector<Unknown>* ends, ExpectedOutcome& outcome) const {
+  /// Log odds of the true explanation, both refitted; nothing where a search did not arrive. `end`: the place in `ends` of the true one, before that of the other.
+  std::optional<double> by_refit(std::size_t truth, std::size_t other, std::size_t c, std::size_t draw, std::size_t end, ExpectedOutcome& outcome) const {
     const CandidateRun& candidate = candidates_[c];
     const bool exact = draw == 0;
     std::mt19937_64 random = noise_of(problem_, c, draw);
@@ -100,8 +118,8 @@ class Search {
     // The readings that are read with noise leave as many as there are, within what chance leaves in one of a million; the angle of a turn always is.
     const double read = static_cast<double>(run.exact.samples()) * ((exact ? 0.0 : static_cast<double>(fits_[truth]->joint().runs()[candidate.like].channels().size())) + (run.windows.empty() ? 0.0 : 1.0));
     const double chance = read + 5 * std::sqrt(2 * read) + 5;
-    const FittedExplanation::Refit right = refitted(truth, run, candidate, exact, chance, ends[0], outcome);
-    const FittedExplanation::Refit wrong = refitted(other, run, candidate, exact, right.chi2 + 2 * enough_to_decide, ends[1], outcome);
+    const FittedExplanation::Refit right = refitted(truth, run, candidate, exact, chance, end, outcome);
+    const FittedExplanation::Refit wrong = refitted(other, run, candidate, exact, right.chi2 + 2 * enough_to_decide, end + 1, outcome);
     if (!right.arrived || !wrong.arrived) return {};
     if (right.chi2 > chance) {  // the truth is at hand, and the search did not find it
       --outcome.arrived;
@@ -112,8 +130,8 @@ class Search {
 
   void refit(const Comparison& comparison, ExpectedOutcome& outcome) const {
     try {
-      outcome.refitted.first = by_refit(comparison.first, comparison.second, outcome.candidate, 0, outcome.ends.data(), outcome).value_or(ExpectedOutcome::unknown);
-      outcome.refitted.second = by_refit(comparison.second, comparison.first, outcome.candidate, 0, outcome.ends.data() + 2, outcome).value_or(ExpectedOutcome::unknown);
+      outcome.refitted.first = by_refit(comparison.first, comparison.second, outcome.candidate, 0, 0, outcome).value_or(ExpectedOutcome::unknown);
+      outcome.refitted.second = by_refit(comparison.second, comparison.first, outcome.candidate, 0, 2, outcome).value_or(ExpectedOutcome::unknown);
     } catch (const std::runtime_error& e) {
       outcome.failed = e.what();
     }
@@ -157,7 +175,7 @@ class Search {
     in_parallel(2 * draws, [&](std::size_t k) {
       const bool first = k < draws;
       try {
-        odds[k] = by_refit(first ? comparison.first : comparison.second, first ? comparison.second : comparison.first, best.candidate, 1 + k, each[k].ends.data() + (first ? 0 : 2), each[k]);
+        odds[k] = by_refit(first ? comparison.first : comparison.second, first ? comparison.second : comparison.first, best.candidate, 1 + k, first ? 0 : 2, each[k]);
       } catch (const std::runtime_error&) {  // drawn parameters with which the model runs away
         each[k].searches += 1;
       }
@@ -243,8 +261,8 @@ Plan propose(const ProposeProblem& problem) {
   best.settle(best);
   for (const auto& fit : fits)
     if (fit.get() != &best) fit->settle(best);
-  for (const auto& fit : fits) plan.log_odds_now.push_back(log_odds_between(*fits.front(), *fit));
   for (std::size_t k = 1; k < fits.size(); ++k) plan.comparisons.push_back(Search(problem, plan.candidates, fits).compare(0, k));
+  for (const auto& fit : fits) plan.log_odds_now.push_back(log_odds_between(*fits.front(), *fit));
   plan.ranking = ranking_of(plan);
   return plan;
 }

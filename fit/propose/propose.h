@@ -33,6 +33,7 @@ struct ExpectedOutcome {
   std::pair<std::vector<double>, std::vector<double>> drawn;     ///< log odds of the true one, simulated with noise and drawn parameters, where both refits arrived
   /// Unknowns of the refits without noise: where the first is true, of the first and of the second; then where the second is.
   std::array<std::vector<Unknown>, 4> ends;
+  std::array<double, 4> risen = {0, 0, 0, 0};  ///< chi-square there, less that of the runs at hand alone
   int searches = 0, arrived = 0;                                 ///< refits, and how many of them arrived
 
   bool was_refitted() const { return searches > 0; }
