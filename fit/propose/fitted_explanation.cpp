@@ -10,6 +10,7 @@
 #include "fit/effect_option.h"
 #include "fit/fit_description.h"
 #include "fit/search/effect_search.h"
+#include "fit/solver/gauss_newton.h"
 #include "fit/uncertainty/undetermined.h"
 
 namespace unrig {
@@ -152,7 +153,13 @@ FittedExplanation::Refit FittedExplanation::search(std::vector<RunResidual> all,
   options.precision = 0.1;  // standard errors: a hundredth of chi-square
   options.most_evaluations = 100;
   const JointProblem::Summary summary = with.solve(options);
-  return {summary.converged && std::isfinite(summary.chi2), summary.chi2 - chi2_, with.unknowns()};
+  bool arrived = summary.converged && std::isfinite(summary.chi2);
+  if (!arrived && std::isfinite(summary.chi2)) {  // along what hardly matters a search goes on for long
+    constexpr double hardly = 0.3;                // standard errors: less than a tenth of chi-square
+    const LeastSquaresProblem squares = with.least_squares();
+    arrived = standing(squares, linearise(squares, squares.values())).step_left < hardly;
+  }
+  return {arrived, summary.chi2 - chi2_, with.unknowns()};
 }
 
 FittedExplanation::Refit FittedExplanation::refit(const RunResidual& added, std::size_t like, const std::vector<Unknown>& start) const {

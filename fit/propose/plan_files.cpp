@@ -131,7 +131,9 @@ std::string verdict_of(const Plan& plan, const Comparison& c, const PlanPaths& p
     if (best.was_refitted()) return "not known: no candidate's refits arrived";
     return fmt::format("not known: nothing was simulated and refitted; to first order {} promises log odds of {:.3g}", what, best.least());
   }
-  return fmt::format("no run within your limits decides: the best, {}, promises log odds of {:.3g}, and {} are wanted{}", what, best.least(), enough_to_decide, some_open ? "; of some candidates it is not known" : "");
+  const auto [first, second] = best.expected();
+  const std::string one_sided = std::max(first, second) < enough_to_decide ? "" : fmt::format("; it would, by {:.3g}, if {} is true", std::max(first, second), plan.explanations[first > second ? c.first : c.second].name);
+  return fmt::format("no run within your limits decides: the best, {}, promises log odds of {:.3g}, and {} are wanted{}{}", what, best.least(), enough_to_decide, one_sided, some_open ? "; of some candidates it is not known" : "");
 }
 
 std::vector<TextFile> plan_files(const Plan& plan, const PlanPaths& paths, const Provenance& made) {
