@@ -36,11 +36,12 @@ int propose_command(int argc, char** argv) {
       "  pluck_load = \"40 N\"            # largest load that a free decay is released from\n"
       "  angle = [\"-2 deg\", \"10 deg\"]   # of the shaft, with\n"
       "  rate = \"60 deg/s\"              # its largest rate\n"
+      "  angle_noise = \"0.01 deg\"      # of the measured angle, where no step at hand shows it\n"
       "  speed = \"0.8 m/s\"              # largest; without it the speeds of the runs at hand\n"
       "  force = \"20 N\"                 # largest measured force\n"
       "  duration = \"10 s\"              # without it that of the runs at hand\n"
       "  medium = [{ name = \"water\", density = \"998.2 kg/m^3\" }]   # without it those of the runs at hand\n"
-      "Exit status 1: for some pair no run within the limits decides.\n"
+      "Exit status 1: for some pair no run within the limits is known to decide.\n"
       "\nExample:\n  unrig propose diagnosis.json --limits limits.toml -o plan.toml");
   try {
     parse_command_line(app, argc, argv);
