@@ -25,6 +25,7 @@
 #include "fit/diagnose/diagnose_command.h"
 #include "fit/trial/trial_command.h"
 #include "fit/fit_command.h"
+#include "fit/propose/propose_command.h"
 #include "fit/simulate/simulate_command.h"
 
 namespace {
@@ -37,6 +38,7 @@ constexpr unrig::Command commands[] = {
     {"fit", "fit stiffness, damping and apparent mass of a rig to recordings", unrig::fit_command},
     {"apparent-mass", "apparent mass of the fluid from the frequencies of a dry and a wet free decay", unrig::apparent_mass_command},
     {"diagnose", "where recordings and model differ, and which physics was left out", unrig::diagnose_command},
+    {"propose", "which run to record next: the one that decides between explanations of a diagnosis", unrig::propose_command},
     {"trial", "how often diagnose finds what was hidden in simulated campaigns", unrig::trial_command},
     {"correct", "take the rig out of a gauge record: rigid-rig load and indicial response", unrig::correct_command},
     {"batch", "check, fit, correct and diagnose many campaigns: one table with a row for each run", unrig::batch_command},

@@ -20,8 +20,9 @@ fit.json, apparent.json, diagnosis.json, trial.json, check.json     results
 corrected.csv, indicial.csv, simulated.csv                          results in columns
 campaigns.toml, table.csv                                           many campaigns for batch, and its table
 law.toml    a law of one's own
+limits.toml, plan.toml      what can be recorded, and what propose proposes
 FILES
-printf 'Their formats: share/doc/unrig/manual/run_files.md, rig_files.md, laws.md, results.md, batch.md.\n'
+printf 'Their formats: share/doc/unrig/manual/run_files.md, rig_files.md, laws.md, results.md, propose.md, batch.md.\n'
 printf '.SH EXIT STATUS\n'
 verbatim << 'STATUS'
 0    done; warnings, if there are any, on standard error
@@ -38,6 +39,7 @@ unrig check --rig rig.toml dry_pluck.csv wet_pluck.csv step_a.csv
 unrig fit --rig rig.toml dry_pluck.csv wet_pluck.csv step_a.csv -o fit.json
 unrig correct --rig rig.toml --fit fit.json step_a.csv -o corrected.csv --indicial indicial.csv
 unrig diagnose --rig rig.toml dry_pluck.csv wet_pluck.csv step_a.csv -o diagnosis.json
+unrig propose diagnosis.json --limits limits.toml -o plan.toml
 unrig report fit.json corrected.csv -o report.html
 unrig batch campaigns.toml -o table.csv
 EXAMPLES

@@ -17,6 +17,7 @@ for shell in bash fish zsh; do
   if ! command -v "$shell" > /dev/null; then echo "$shell is not there: left out"; continue; fi
   says "$shell" "a command" diagnose "$("in_$shell" dia)"
   says "$shell" "an option" --heldout "$("in_$shell" diagnose --hel)"
+  says "$shell" "an option" --limits "$("in_$shell" propose --lim)"
   says "$shell" "an effect" quadratic-drag "$("in_$shell" fit --effect quadr)"
 done
 exit "$failed"
