@@ -91,13 +91,15 @@ TEST_P(LawSearches, FindTheFormAndItsParameters) {
   EXPECT_FALSE(leaves_something(*trial));
   for (const auto& [name, value] : truth.parameters)
     for (const Unknown& u : trial->arrival.joint.unknowns())
-      if (trial->arrival.joint.parameter(u).name == id + "." + name) EXPECT_NEAR(u.value, value, 0.03 * std::abs(value)) << name;
+      if (trial->arrival.joint.parameter(u).name == id + "." + name) {
+        EXPECT_NEAR(u.value, value, 0.03 * std::abs(value)) << name;
+      }
   // Beyond chance no other rival than what such decays cannot tell apart: fewer than half of all that were fitted.
   EXPECT_LE(2 * rivals(problem, found, leaves_something, decisive).size(), found.size());
 }
 
-INSTANTIATE_TEST_SUITE_P(Of, LawSearches, testing::Range<std::size_t>(0, hidden.size()), [](const auto& info) {
-  std::string name = hidden[info.param].law;
+INSTANTIATE_TEST_SUITE_P(Of, LawSearches, testing::Range<std::size_t>(0, hidden.size()), [](const auto& which) {
+  std::string name = hidden[which.param].law;
   std::replace(name.begin(), name.end(), ' ', '_');
   return name;
 });
