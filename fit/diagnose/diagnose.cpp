@@ -9,7 +9,6 @@
 #include <fmt/format.h>
 
 #include "core/effects/effect.h"
-#include "core/law/law_effect.h"
 #include "core/files/error.h"
 #include "core/law/law_effect.h"
 #include "core/rig/fingerprint.h"
