@@ -358,29 +358,37 @@ struct Laws {
 
 bool leaves_something(const Trial& t) { return what_remains(t).found; }
 
-/// The law of what no effect explains: from the fit with nothing missing or, where that finds none, beside the best set. Where one is named and its evidence beats what was `found`, it is in `found`.
+/// The law of what no effect explains: beside nothing, since an effect of the list may stand in for it, and beside the best set. Where the best of both is named and has the best evidence of all sets that were
+/// tried, decisively better than what was `found`, it is in `found`.
 std::optional<Laws> look_for_laws(const DiagnoseProblem& problem, FitProblem& fit_problem, const Setting& files, const Trial& baseline, Selection& selection, Explanation& found) {
-  const bool named = !found.best.effects.empty() && naming_of(found.best, baseline, found.clean(), found.predicts) == Naming::named;
-  std::vector<const Trial*> bases;
-  if (!named) bases.push_back(&baseline);
-  if (!found.best.effects.empty()) bases.push_back(&found.best);
-  for (const Trial* base : bases) {
-    LawSearch search(fit_problem, *base, leaves_something);
-    Laws laws{search.search(), search.reach()};
-    for (const Trial& t : laws.tried) selection.add({t.effects, t.reduced_chi2(), bic_difference(t, baseline), 0, 0});
-    if (laws.tried.empty()) continue;
-    Explanation with = look_at(problem, files, baseline, files, laws.tried.front(), 0);
-    if (naming_of(with.best, baseline, with.clean(), with.predicts) != Naming::named || !(bic_difference(with.best, found.best) < -decisive)) continue;
-    found = std::move(with);
-    return laws;
-  }
+  Laws laws;
+  const auto look_beside = [&](const Trial& base) {
+    LawSearch search(fit_problem, base, leaves_something);
+    for (Trial& t : search.search()) {
+      selection.add({t.effects, t.reduced_chi2(), bic_difference(t, baseline), 0, 0});
+      laws.tried.push_back(std::move(t));
+    }
+    laws.reach = search.reach();
+  };
+  look_beside(baseline);
+  if (!found.best.effects.empty()) look_beside(found.best);
+  std::stable_sort(laws.tried.begin(), laws.tried.end(), [](const Trial& a, const Trial& b) { return bic_difference(a, b) < 0; });
   fit_problem.rig.laws.clear();
-  return std::nullopt;
+  if (laws.tried.empty()) return std::nullopt;
+  fit_problem.rig.laws = laws.tried.front().arrival.joint.model().rig().laws;
+  Explanation with = look_at(problem, files, baseline, files, laws.tried.front(), 0);
+  const bool best_of_all = bic_difference(with.best, baseline) <= selection.ranking().front().delta_bic;
+  if (naming_of(with.best, baseline, with.clean(), with.predicts) != Naming::named || !best_of_all || !(bic_difference(with.best, found.best) < -decisive)) {
+    fit_problem.rig.laws.clear();
+    return std::nullopt;
+  }
+  found = std::move(with);
+  return laws;
 }
 
 /// Laws among `set`, told as such; the rig keeps only those at work.
 void tell_laws(FitProblem& fit_problem, const Laws& laws, const Explanation& found, std::vector<MissingEffect>& set, Diagnosis& d) {
-  const std::vector<Rival> others = rivals(fit_problem, laws.tried, leaves_something, decisive);
+  const std::vector<Rival> others = rivals(laws.tried, leaves_something, decisive);
   for (MissingEffect& m : set)
     if (is_law_id(m.effect)) {
       m.law = found_law(fit_problem.rig, m.effect, found.fit, laws.reach);

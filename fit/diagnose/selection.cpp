@@ -241,9 +241,9 @@ Trial Selection::without_stand_in(const Trials& tried) {
   return alone;
 }
 
-/// A law is not found from far away where the rig's modes are too few for its trajectory: where nothing explains what is missing, every effect is tried beside the modes that were left out too.
+/// A law is not found from far away where the modes of a beam are too few for its trajectory: where nothing explains what is missing, every effect is tried beside the modes that were left out too.
 void Selection::try_with_all_modes(Trials& tried) {
-  if (any_leaves_nothing(tried) || baseline_.reduced_chi2() < nearly_explained) return;
+  if (any_leaves_nothing(tried) || baseline_.reduced_chi2() < nearly_explained || problem_.rig.is_modal()) return;
   const auto modes = std::find_if(tried.begin(), tried.end(), [](const Trial& t) { return t.effects.size() == 1 && effect(t.effects.front()).enriches_basis; });
   if (modes == tried.end()) return;
   tell("trying what may be missing beside " + modes->effects.front());

@@ -47,13 +47,13 @@ FoundLaw found_law(const Rig& rig, const std::string& id, const FitResult& fit, 
   return found;
 }
 
-std::vector<Rival> rivals(const FitProblem& problem, const std::vector<Trial>& tried, const std::function<bool(const Trial&)>& leaves_something, double decisive) {
+std::vector<Rival> rivals(const std::vector<Trial>& tried, const std::function<bool(const Trial&)>& leaves_something, double decisive) {
   std::vector<Rival> all;
   for (std::size_t i = 1; i < tried.size(); ++i) {
     const Trial& t = tried[i];
     const double behind = bic_difference(t, tried.front());
     if (!(behind < decisive) || leaves_something(t)) continue;
-    const Effect& e = effect(problem.rig, t.effects.back());
+    const Effect& e = effect(t.arrival.joint.model().rig(), t.effects.back());
     Rival rival{t.effects, e.equation, "", "", std::sqrt(std::max(0.0, deviance_difference(t, tried.front()))), 0.5 * behind};
     if (is_law_id(e.id)) {
       const auto value_of = [&](const std::string& name) -> const double* {

@@ -33,6 +33,6 @@ struct FoundLaw {
 FoundLaw found_law(const Rig& rig, const std::string& id, const FitResult& fit, const Reach& reach);
 
 /// Of all sets that were tried those that leave nothing and whose evidence is within `decisive` (a difference of BIC) of the best, which stands first and is none of them.
-std::vector<Rival> rivals(const FitProblem& problem, const std::vector<Trial>& tried, const std::function<bool(const Trial&)>& leaves_something, double decisive);
+std::vector<Rival> rivals(const std::vector<Trial>& tried, const std::function<bool(const Trial&)>& leaves_something, double decisive);
 
 }  // namespace unrig

@@ -48,8 +48,7 @@ std::vector<Column> shapes_of(const std::vector<Form>& forms, ActsOn place) {
       if (std::find(linear.begin(), linear.end(), static_cast<Index>(k)) != linear.end()) continue;
       const Parameter& p = law.parameters[k];
       std::vector<double> values;
-      if (p.name == "p")
-        values = {0.5, 1.5, 2, 2.5, 3, 4, 5};
+      if (p.name == "p") values = {0.5, 1.5, 2, 2.5, 3, 4, 5};
       else
         for (const double factor : {0.2, 0.5, 1.0, 2.0, 4.0}) values.push_back(factor * shapes.front()[static_cast<Index>(k)]);
       std::vector<VectorXd> each;
@@ -76,10 +75,8 @@ struct Port {
 Port port_of(const RunResidual& run, const VectorXd& theta, ActsOn place) {
   Rig rig = run.model().rig();
   rig.laws.clear();
-  const char* text = place == ActsOn::torsion ? "unrig_law = 1\nname = \"port\"\nacts_on = \"torsion\"\nforce = \"-c * "
-                                                "twist\"\n[parameters]\nc = { start = \"0 N.m\" }\n[scales]\ntwist = \"1 rad\"\n"
-                                              : "unrig_law = 1\nname = \"port\"\nacts_on = \"normal\"\nforce = \"-c * x\"\n[parameters]\nc "
-                                                "= { start = \"0 N\" }\n[scales]\nx = \"1 m\"\n";
+  const char* text = place == ActsOn::torsion ? "unrig_law = 1\nname = \"port\"\nacts_on = \"torsion\"\nforce = \"-c * twist\"\n[parameters]\nc = { start = \"0 N.m\" }\n[scales]\ntwist = \"1 rad\"\n"
+                                              : "unrig_law = 1\nname = \"port\"\nacts_on = \"normal\"\nforce = \"-c * x\"\n[parameters]\nc = { start = \"0 N\" }\n[scales]\nx = \"1 m\"\n";
   add_law(rig, parse_law(text, "the port of a law"));
   const std::string id = rig.laws.front()->id;
   const AeroelasticModel model = AeroelasticModel(rig, run.model().basis(), run.model().circulation()).with_effects({id});
@@ -115,10 +112,9 @@ VectorXd force_along(const Law& law, const VectorXd& parameters, const MatrixXd&
   symbol[at(Symbol::U)] = conditions.speed;
   symbol[at(Symbol::theta)] = conditions.onset_angle;
   const auto look = [&](const VectorXd& s, double t) {
-    symbol[at(Symbol::x)] = s[0], symbol[at(Symbol::v)] = s[1], symbol[at(Symbol::twist)] = s[2], symbol[at(Symbol::twist_rate)] = s[3],
-    symbol[at(Symbol::t)] = t;
+    symbol[at(Symbol::x)] = s[0], symbol[at(Symbol::v)] = s[1], symbol[at(Symbol::twist)] = s[2], symbol[at(Symbol::twist_rate)] = s[3], symbol[at(Symbol::t)] = t;
   };
-  constexpr int parts = 8;    // of a sample, for the memory
+  constexpr int parts = 8;  // of a sample, for the memory
   constexpr double most = 2;  // times its limit: where steps are too long it is held there
   VectorXd force(states.cols());
   double z = 0;
@@ -131,15 +127,13 @@ VectorXd force_along(const Law& law, const VectorXd& parameters, const MatrixXd&
       const double share = (i + 0.5) / parts;
       look((1 - share) * states.col(k) + share * states.col(k + 1), (static_cast<double>(k) + share) * dt);
       symbol[at(Symbol::z)] = z;
-      z = std::clamp(z + dt / parts * (*law.memory)(symbol.data(), parameters.data(), in_symbols.data(), in_parameters.data()), -most,
-                     most);
+      z = std::clamp(z + dt / parts * (*law.memory)(symbol.data(), parameters.data(), in_symbols.data(), in_parameters.data()), -most, most);
     }
   }
   return force;
 }
 
-/// What one decay says: innovations of readings and of every column, what shifts and initial states explain taken out, at several densities
-/// of the unknown force.
+/// What one decay says: innovations of readings and of every column, what shifts and initial states explain taken out, at several densities of the unknown force.
 struct Said {
   struct Level {
     MatrixXd products;  // of [columns | readings]
@@ -150,8 +144,7 @@ struct Said {
 
 constexpr std::array<double, 5> densities{1, 0.1, 0.01, 1e-3, 1e-4};  // times the one that the readings ask for where no law is known
 
-std::optional<Said> ask(const RunResidual& run, const VectorXd& theta, ActsOn place, const std::vector<Form>& forms,
-                        const std::vector<Column>& columns, const MatrixXd& states) {
+std::optional<Said> ask(const RunResidual& run, const VectorXd& theta, ActsOn place, const std::vector<Form>& forms, const std::vector<Column>& columns, const MatrixXd& states) {
   const RunResidual::Prediction p = run.predict(theta);
   if (!p.output.allFinite()) return std::nullopt;
   const Port port = port_of(run, theta, place);
@@ -221,8 +214,7 @@ Regression regress(const std::vector<std::optional<Said>>& said, std::size_t lev
     const Said::Level& l = s->levels[level];
     const Index readings = l.products.cols() - 1;
     MatrixXd own(count + 1, count + 1);
-    own << l.products.block(first, first, count, count), l.products.block(first, readings, count, 1),
-        l.products.block(readings, first, 1, count), l.products(readings, readings);
+    own << l.products.block(first, first, count, count), l.products.block(first, readings, count, 1), l.products.block(readings, first, 1, count), l.products(readings, readings);
     products += own / l.variance;
     entropy += l.samples * std::log(l.variance);
   }

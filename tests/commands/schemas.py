@@ -4,6 +4,7 @@ Each schema is tried on results that differ in what they hold. Then, of each kin
 the schema has to refuse all three. At last every key that a schema names has to have stood in a result, but for those in `rare`. Status 77: python3-jsonschema is not there."""
 import copy
 import json
+import math
 import pathlib
 import random
 import subprocess
@@ -42,6 +43,18 @@ def write(path, text):
     return path
 
 
+def damped_decay(path, x, hertz=7, dt=0.004, samples=900, finer=40):
+    """x'' + 2 zeta omega (1 + (2x)^2) x' + omega^2 x = 0 by Euler's semi-implicit method, with noise."""
+    omega = 2 * math.pi * hertz
+    noise, h, v, lines = random.Random(x), dt / finer, 0.0, ['# unrig_run = 1', '# kind = "pluck"', '# medium = "air"', '# density = "1.2 kg/m^3"', '# speed = "0 m/s"', "time [s],gauge [N]"]
+    for i in range(samples):
+        lines.append(f"{i * dt:.3f},{x + noise.gauss(0, 0.002):.6f}")
+        for _ in range(finer):
+            v -= h * (0.02 * omega * (1 + 4 * x * x) * v + omega**2 * x)
+            x += h * v
+    return write(path, "\n".join(lines) + "\n")
+
+
 def make_results(out):
     """All kinds of results, into the folder `out`."""
     decays, steps = ("dry_pluck.csv", "wet_pluck.csv"), ("step_a.csv", "step_b.csv")
@@ -70,6 +83,9 @@ def make_results(out):
     long_chord = write(out / "long_chord.toml", (null / "rig.toml").read_text().replace('chord = "6 in"', 'chord = "6.06 in"'))
     unrig("diagnose", "--rig", long_chord, *(null / run for run in (*decays, "step_a.csv", "step_b.csv", "step_c.csv")), "--effects", "tank-wave", "-o", out / "diagnosis_rig.json")
     unrig("diagnose", *campaign("wave", *decays, "step_a.csv"), "--effects", "coulomb-friction", "-o", out / "diagnosis_unexplained.json", status=(1,))
+
+    mode = write(out / "mode.toml", 'unrig_rig = 1\nname = "one mode"\n[[modal]]\nmass = "1 kg"\nfrequency = "7 Hz"\ndamping_ratio = 0.01\ngauge_gain = "1 N/m"\n')
+    unrig("diagnose", "--rig", mode, *(damped_decay(out / f"{name}.csv", start) for name, start in (("large", 1.0), ("small", -0.4))), "-o", out / "diagnosis_law.json", status=(0, 1))
 
     for shard in (1, 2):
         unrig("trial", *campaign("null"), "--trials", 3, "--effects", "tank-wave,gauge-lowpass", "--shard", f"{shard}/2", "-o", out / f"trial_{shard}.json")
