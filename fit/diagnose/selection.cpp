@@ -24,7 +24,7 @@ using Tell = std::function<void(const std::string&)>;
 
 constexpr double nearly_explained = 10, twice_the_noise = 2;
 constexpr double hardly_less = 0.9;  // of the excess: an effect that leaves so much of it is not what is missing
-constexpr std::size_t most_refits = 5, most_effects = 3, most_in_full = 2;
+constexpr std::size_t most_refits = 5, most_in_full = 2;
 constexpr std::size_t few = 7;  // candidates that are all worth a fit
 
 /// A few rounds for all, the rest for those that are ahead.

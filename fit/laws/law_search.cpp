@@ -76,6 +76,14 @@ std::vector<Trial> LawSearch::one_more(const Trial& base) {
     set.push_back(added[i]);
     tried[i] = std::make_unique<Trial>(prepare(problem_, base, set));
     if (by_decays && nonlinear(*tried[i])) tried[i]->ruled_out = !fit_decays_first(*tried[i], base, true);
+  });
+  // Of thousands of samples twice the excess of another is beyond any evidence.
+  const auto excess = [](const Trial& t) { return std::max(0.0, left_of_decays(t) - 1); };
+  double least = INFINITY;
+  for (const auto& t : tried)
+    if (by_decays && !t->ruled_out) least = std::min(least, std::max(excess(*t), explained - 1));
+  for (const auto& t : tried) t->ruled_out = t->ruled_out || (by_decays && excess(*t) > 2 * least);
+  in_parallel(tried.size(), [&](std::size_t i) {
     if (!tried[i]->ruled_out) follow_further(*tried[i], INFINITY);
   });
   std::vector<Trial> fitted;
@@ -87,7 +95,7 @@ std::vector<Trial> LawSearch::one_more(const Trial& base) {
 
 std::vector<Trial> LawSearch::search() {
   std::vector<Trial> all = one_more(base_);
-  if (all.empty() || !leaves_something_(all.front()) || !(bic_difference(all.front(), base_) < 0)) return all;
+  if (all.empty() || all.front().effects.size() >= most_effects || !leaves_something_(all.front()) || !(bic_difference(all.front(), base_) < 0)) return all;
   const Trial first = all.front();
   std::vector<Trial> pairs = one_more(first);
   std::move(pairs.begin(), pairs.end(), std::back_inserter(all));

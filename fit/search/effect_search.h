@@ -26,6 +26,7 @@ struct Trial {
   double excess() const;
 };
 
+constexpr std::size_t most_effects = 3;  ///< of one set
 constexpr double explained = 1.15;  ///< residual power over noise power of a model that leaves nothing to name
 inline bool leaves_nothing(const Trial& trial) { return trial.reduced_chi2() < explained; }
 
