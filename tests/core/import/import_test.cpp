@@ -259,6 +259,20 @@ TEST(Delimited, ReadsOtherEncodings) {
   EXPECT_EQ(in_utf8("\xE2\x82\xAC"), "\xE2\x82\xAC");
 }
 
+TEST(Delimited, FindsTheTitlesAboveATable) {
+  const std::string rows = "time (ms);force (N)\n0;1,5\n2;1,25\n4;1,0\n";
+  for (const std::string titles : {"A recording\n\n", "A recording;\nof today;\n", "one\ntwo, with a comma\nthree: 3\n"}) {
+    const Recording r = read_delimited(titles + rows, "f");
+    ASSERT_EQ(r.channels.size(), 2u) << titles;
+    EXPECT_EQ(r.channels[0].unit, "ms") << titles;
+    EXPECT_EQ(r.channels[1].value, (std::vector<double>{1.5, 1.25, 1})) << titles;
+    EXPECT_THAT(r.warnings.back(), HasSubstr("taken for titles"));
+  }
+  EXPECT_TRUE(read_delimited(rows, "f").warnings.empty());
+  EXPECT_TRUE(read_delimited("# A recording\n" + rows, "f").warnings.empty()) << "remarks are no titles";
+  EXPECT_EQ(read_delimited("A recording\nof today\n" + rows, "f", {"", "", 2, {}}).warnings.size(), 0u) << "where the mapping says so";
+}
+
 TEST(Delimited, RefusesWhatIsNoTable) {
   EXPECT_THAT(complaint([] { read_delimited("", "f"); }), HasSubstr("no table"));
   EXPECT_THAT(complaint([] { read_delimited("a,b\n", "f"); }), HasSubstr("no rows"));
