@@ -141,6 +141,28 @@
     };
   }
 
+  // Shares of a whole, the last at the bottom. Dygraphs' own stacks leave out the top one of long records.
+  function stack(block) {
+    return (e) => {
+      if (e.seriesIndex !== 0) return;  // all at once
+      const context = e.drawingContext, sets = e.allSeriesPoints, x = sets[0].map((point) => point.canvasx);
+      const rows = x.map((_, k) => k).filter((k) => sets.every((points) => isFinite(points[k].yval)));
+      let below = x.map(() => 0);
+      context.save();
+      context.globalAlpha = 0.75;
+      for (let s = sets.length - 1; s >= 0; --s) {
+        const under = below, above = under.map((y, k) => y + sets[s][k].yval);
+        context.fillStyle = colours().series[block.series[s].colour];
+        context.beginPath();
+        for (const k of rows) context.lineTo(x[k], e.dygraph.toDomYCoord(above[k]));
+        for (const k of [...rows].reverse()) context.lineTo(x[k], e.dygraph.toDomYCoord(under[k]));
+        context.fill();
+        below = above;
+      }
+      context.restore();
+    };
+  }
+
   const groups = {};  // name -> graphs that zoom together
   function follow(group) {
     let busy = false;
@@ -189,7 +211,7 @@
         x: {axisLabelFormatter: readable, valueFormatter: readable, logscale: !!block.log_x, axisLabelWidth: 70, ticker: block.log_x ? decades : Dygraph.numericLinearTicks},
         y: {axisLabelFormatter: readable, valueFormatter: readable, axisLabelWidth: 72, ticker: block.log_y ? decades : Dygraph.numericLinearTicks, valueRange: block.stacked ? [0, 1] : block.y_range || null},
       },
-    }, look(), block.stacked ? {stackedGraph: true, fillAlpha: 0.75, highlightCircleSize: 0} : {}, block.marks || block.boxes ? {underlayCallback: underlay(block)} : {}, block.group ? follow(block.group) : {}));
+    }, look(), block.stacked ? {plotter: stack(block), highlightCircleSize: 0} : {}, block.marks || block.boxes ? {underlayCallback: underlay(block)} : {}, block.group ? follow(block.group) : {}));
     if (block.group) (groups[block.group] = groups[block.group] || []).push(graph);
     report.graphs[name] = graph;
     const range = () => ({x: graph.xAxisRange(), y: graph.yAxisRange()});
