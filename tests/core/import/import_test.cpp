@@ -14,6 +14,7 @@
 #include "core/files/error.h"
 #include "core/import/channel_list.h"
 #include "core/import/delimited.h"
+#include "core/import/import_template.h"
 #include "core/import/lvm.h"
 #include "core/run/run.h"
 #include "tests/support/temporary_directory.h"
@@ -108,6 +109,16 @@ TEST(Import, NamesWhatIsWrongInAMapping) {
   Recording uneven = recording();
   uneven.channels[1].value.pop_back();
   EXPECT_THAT(complaint([&] { import_recording(uneven, head + "[[column]]\nname = \"alpha\"\nsource = \"angle\"\n[[column]]\nname = \"gauge\"\nsource = \"bridge\"\n", "m"); }), HasSubstr("3 samples"));
+}
+
+TEST(Import, TakesTheGOfAnAccelerometerForGravity) {
+  std::string rows = "time (s);Beschl. (g)\n";
+  for (int k = 0; k < 30; ++k) rows += std::to_string(k) + ";" + std::to_string(k % 3) + "\n";
+  const Recording r = read_delimited(rows, "log.csv");
+  const std::string text = import_template(r);
+  EXPECT_THAT(text, HasSubstr("name = \"acc\""));
+  const Imported imported = import_recording(r, text, "map.toml");
+  EXPECT_DOUBLE_EQ(parse_run(imported.text, "run.csv").channel("acc").value[2], 2 * 9.80665);
 }
 
 TEST(Import, WarnsOfNamesThatNoCommandReads) {
