@@ -172,15 +172,16 @@ double place_load(const RunResidual& residual, const UncertaintyBudget& budget, 
   by_c.col(residual.first_offset()).setConstant(steady_per_reading(residual.model().rig()));
   const UncertaintyBySource u = budget.of(by_theta, by_c);
   load.value.segment(samples.first, samples.length()) = value;
-  load.std.segment(samples.first, samples.length()) = interpolated(u.std, at, value.size());
-  load.by_source.middleRows(samples.first, samples.length()) = interpolated(u.by_source, at, value.size());
+  const MatrixXd by_source = interpolated(u.by_source, at, value.size());
+  load.by_source.middleRows(samples.first, samples.length()) = by_source;
+  load.std.segment(samples.first, samples.length()) = by_source.rowwise().norm();
   return u.length;
 }
 
 /// Both loads over the whole record. `budget_of`: of a leg.
 void set_loads(const RunInLegs& legs, const std::vector<RunResidual::Evaluation>& by_leg, const std::function<UncertaintyBudget(std::size_t leg)>& budget_of, const VectorXd& theta, CorrectResult& result) {
   const Index n = legs.samples(legs.size() - 1).last;
-  for (CorrectedLoad* load : {&result.circulatory, &result.normal_force}) *load = {VectorXd(n), VectorXd(n), MatrixXd(n, sources), 0, {}, {}};
+  for (CorrectedLoad* load : {&result.circulatory, &result.normal_force}) *load = {VectorXd(n), VectorXd(n), MatrixXd(n, sources), {}, 0, {}, {}};
   std::vector<RigidLoad::State> from(1);
   for (std::size_t p = 0; p + 1 < legs.size(); ++p) from.push_back(going_on(load_at(legs.residual(p), theta, by_leg[p].linear, {0}, from[p]), by_leg[p].linear_slope));
   VectorXd circulatory(legs.size()), normal_force(legs.size());  // lengths of their curves

@@ -22,7 +22,8 @@ struct CorrectProblem {
 /// A load over the record [N].
 struct CorrectedLoad {
   Eigen::VectorXd value, std;
-  Eigen::MatrixXd by_source;  ///< samples x sources: the parts of std
+  Eigen::MatrixXd by_source;  ///< samples x sources: the parts of std, whose squares sum to its square
+  Eigen::VectorXd of_givens = {};  ///< what stated uncertainties of rig file and head make of the rig's part; empty: nothing is stated
   double simultaneous = 0;    ///< the whole curve stays within this many std with a probability of 95 %
   Eigen::VectorXd half_weight, twice_weight;  ///< the answer at half and at twice the regularisation's weight
 };

@@ -10,6 +10,7 @@
 #include <fmt/format.h>
 
 #include "correct/estimate/how_far_to_trust.h"
+#include "correct/estimate/uncertainty_budget.h"
 
 namespace unrig {
 namespace {
@@ -21,6 +22,18 @@ std::string further_columns(const std::string& name, const std::string& unit) {
   std::string header;
   for (const char* source : source_names) header += fmt::format(",{}_std_{}{}", name, source, unit);
   return header + fmt::format(",{}_band95{},{}_half_weight{},{}_twice_weight{}", name, unit, name, unit, name, unit);
+}
+
+std::string share_columns(const std::string& name) {
+  std::string header;
+  for (const char* share : share_names) header += fmt::format(",{}_share_{}", name, share);
+  return header;
+}
+
+template <class Out>
+void share_cells(Out out, const CorrectedLoad& load, Index k) {
+  const Eigen::MatrixXd shares = variance_shares(load.by_source.row(k), load.of_givens.size() > 0 ? load.of_givens.segment(k, 1).eval() : Eigen::VectorXd{});
+  for (const double share : shares.reshaped()) std::isfinite(share) ? fmt::format_to(out, ",{:.6f}", share) : fmt::format_to(out, ",");
 }
 
 template <class Out, class Row>
@@ -37,7 +50,7 @@ std::string to_csv(const CorrectResult& r, const MadeBy& made_by) {
 
 void to_csv(const TextSink& sink, const CorrectResult& r, const MadeBy& made_by) {
   std::string text = "time [s],semichords,gauge [N],normal_force [N],normal_force_std [N],circulatory [N],circulatory_std [N],cn,cn_std";
-  text += further_columns("circulatory", " [N]") + further_columns("normal_force", " [N]") + ",unexplained [N]";
+  text += further_columns("circulatory", " [N]") + further_columns("normal_force", " [N]") + ",unexplained [N]" + share_columns("circulatory") + share_columns("normal_force");
   const HowFarToTrust trust{r.reduced_chi2, r.warnings, r.no_answer, made_by};
   sink(text + trust.header() + "\n");
   const std::string last_cells = trust.cells();
@@ -55,6 +68,7 @@ void to_csv(const TextSink& sink, const CorrectResult& r, const MadeBy& made_by)
       further_cells(out, load->by_source.row(k), load->simultaneous * load->std[k], load->half_weight[k], load->twice_weight[k]);
     row.push_back(',');
     if (std::isfinite(r.unexplained[k])) fmt::format_to(out, "{:.4g}", r.unexplained[k]);
+    for (const CorrectedLoad* load : {&circulatory, &normal}) share_cells(out, *load, k);
     fmt::format_to(out, "{}\n", last_cells);
     sink({row.data(), row.size()});
   }

@@ -285,8 +285,19 @@ void look_at_readings(const Run& run, std::vector<Suspicion>& found) {
     constexpr std::size_t noteworthy = 4;  // noise with heavy tails has one or two in a record of the samples
     if (channel.bad >= noteworthy) tell(channel.bad, "lie far from their neighbours; they are left out.", false);
     const Eigen::Index stuck = stuck_at_an_end(channel.value);
-    if (stuck > 0) tell(static_cast<std::size_t>(stuck), "stand at the end of its range: clipped or saturated? Lower the gain of the amplifier, and record again.", true);
+    if (stuck > 0 && channel.value.minCoeff<Eigen::PropagateNumbers>() == channel.value.maxCoeff<Eigen::PropagateNumbers>())
+      tell(static_cast<std::size_t>(stuck), "are one and the same, it never changes: a broken cable, or a stopped converter?", true);
+    else if (stuck > 0)
+      tell(static_cast<std::size_t>(stuck), "stand at the end of its range: clipped or saturated? Lower the gain of the amplifier, and record again.", true);
   }
+}
+
+/// A record too short for any number of its own: it says nothing of the rig, and does no harm.
+std::optional<Suspicion> too_short(const Run& run, const RunEstimate& e) {
+  if (!(e.periods > 0 && e.periods < 1)) return {};
+  const std::string where = base_name(run.file), cause = "cut off, or the wrong file?";
+  return Suspicion{where, {cause}, e.periods, 0, false,
+                   fmt::format("{}: {} samples, {:.3g} s, are {:.2g} periods of the rig, and say nothing of it; {} Record several.", where, run.samples(), run.dt * static_cast<double>(run.samples()), e.periods, cause)};
 }
 
 }  // namespace
@@ -308,6 +319,8 @@ std::vector<Suspicion> suspicions(const Rig& rig, const std::vector<Run>& runs) 
     found.push_back(*s);
     return found;
   }
+  for (std::size_t r = 0; r < whole.size(); ++r)
+    if (const auto s = too_short(whole[r], campaign.estimates()[r])) found.push_back(*s);
   const PlausibleCampaign plausible = campaign.plausible();
   std::vector<Suspicion> late = late_channels(plausible);
   if (late.empty())

@@ -294,10 +294,10 @@ RunEstimate estimate(const CheckModel& check, const Run& run, double reference) 
   if (rig.is_modal() || rig.gauge_element == 0 || !run.find("gauge")) return found;
   found.modelled = coupled_frequencies(rig, check.basis(), run.density)[0];
   found.fluid_share = fluid_share(check, run.density);
+  found.periods = run.dt * static_cast<double>(run.samples()) * found.modelled;
   if (run.samples() < least_samples) return found;
   found.looked_at = run.kind == RunKind::step || run.kind == RunKind::pluck;
   found.nyquist_ratio = 0.5 / (run.dt * found.modelled);
-  found.periods = run.dt * static_cast<double>(run.samples()) * found.modelled;
   if (const Channel* alpha = run.find("alpha")) {
     const VectorXd angle = median_filtered(without_gaps(alpha->value));
     found.largest_angle = angle.cwiseAbs().maxCoeff();

@@ -78,6 +78,41 @@ struct ReadColumn {
   std::optional<LeftOutChannel> left_out{};
 };
 
+std::size_t cells_in(std::string_view line, const std::string& delimiter) {
+  std::vector<std::string_view> cells = cells_of(line, delimiter);
+  while (!cells.empty() && cells.back().empty()) cells.pop_back();
+  return cells.size();
+}
+
+bool looks_like_numbers(std::string_view line, const std::string& delimiter) {
+  for (const std::string_view cell : cells_of(line, delimiter))
+    if (cell.find_first_not_of("+-0123456789.,:eE ") != std::string_view::npos) return false;
+  return line.find_first_of("0123456789") != std::string_view::npos;
+}
+
+/// Lines before the table that have fewer cells than it: what a program or a spreadsheet writes about the recording. The table begins where two rows of numbers are alike,
+/// with the rows of as many cells right above them. None in a table between blanks, where words of a title look like names.
+int title_lines(std::string_view text, const std::string& given) {
+  constexpr std::size_t furthest = 200;
+  struct Row {
+    std::string_view line;
+    int above;
+  };
+  std::vector<Row> rows;
+  Lines lines{text};
+  if (text.find('\n') == std::string_view::npos) lines.end = '\r';
+  for (std::string_view line; rows.size() < furthest && lines.next(line);) rows.push_back({line, lines.line - 1});
+  for (std::size_t k = 1; k + 1 < rows.size(); ++k) {
+    const std::string delimiter = given.empty() ? delimiter_in(rows[k].line) : given;
+    const std::size_t count = cells_in(rows[k].line, delimiter);
+    if (delimiter == "blanks" || count < 2 || !looks_like_numbers(rows[k].line, delimiter) || !looks_like_numbers(rows[k + 1].line, delimiter) || cells_in(rows[k + 1].line, delimiter) != count) continue;
+    std::size_t first = k;
+    while (first > 0 && cells_in(rows[first - 1].line, delimiter) == count) --first;
+    return first == 0 || first == k ? 0 : rows[first].above;
+  }
+  return 0;
+}
+
 class Table {
  public:
   Table(std::string_view text, const std::string& file, const DelimitedFormat& format) : lines_{text}, format_(format), out_{file, "text", {}, {}} {}
@@ -307,6 +342,12 @@ std::string in_utf8(std::string text) {
   return text;
 }
 
-Recording read_delimited(std::string_view text, const std::string& file, const DelimitedFormat& format) { return Table(text, file, format).read(); }
+Recording read_delimited(std::string_view text, const std::string& file, const DelimitedFormat& format) {
+  DelimitedFormat behind = format;
+  if (format.skip_lines == 0) behind.skip_lines = title_lines(text, format.delimiter);
+  Recording out = Table(text, file, behind).read();
+  if (behind.skip_lines > format.skip_lines) out.warnings.push_back(fmt::format("{}: the first {} line(s) are taken for titles; skip_lines in [format] says otherwise", file, behind.skip_lines));
+  return out;
+}
 
 }  // namespace unrig

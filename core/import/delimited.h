@@ -12,7 +12,7 @@ namespace unrig {
 struct DelimitedFormat {
   std::string delimiter;       ///< one character, or "blanks" for any number of blanks; empty: what the first row has: tab, ; or |, else a comma, else blanks
   std::string decimal;         ///< "." or ","; empty: a comma where it is no delimiter, a number shows one, and none shows a point (DecimalSign), else a point
-  int skip_lines = 0;          ///< before the header, or before the numbers where there is no header
+  int skip_lines = 0;          ///< before the header, or before the numbers where there is no header; 0: titles, lines of fewer cells than the table below them, are found out and warned of
   std::optional<bool> header;  ///< whether a row of names comes first; empty: it does, unless that row holds nothing but numbers
   std::string thousands{};     ///< what sets off groups of three digits: "." "," " " or "'"; empty: nothing does
   std::vector<std::string> missing{};  ///< cells that mean a missing sample: "ERR", "#N/A"

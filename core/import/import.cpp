@@ -80,7 +80,8 @@ bool same_unit(const std::string& a, const std::string& b) try {
 /// The channel's unit: the file's, or the mapping's where the file gives none. A contradiction is an error: one of the two is wrong.
 std::string unit_of(const TomlTable& table, const RecordedChannel& channel) {
   const std::string told = table.text_or("unit", "");
-  if (!told.empty() && !channel.unit.empty() && told != channel.unit && !same_unit(told, channel.unit))
+  const bool of_gravity = (channel.unit == "g" || channel.unit == "G") && same_unit(told, "gravity");  // as makers of accelerometers write it; to UDUNITS it is a gram
+  if (!told.empty() && !channel.unit.empty() && told != channel.unit && !of_gravity && !same_unit(told, channel.unit))
     table.fail("unit", fmt::format("the unit is \"{}\" here and \"{}\" in the file, for \"{}\"", told, channel.unit, channel.name), "wanted the same, or none here",
                "Where the file is wrong, mend it there: nobody can see it in the run file any more.");
   const std::string unit = told.empty() ? channel.unit : told;

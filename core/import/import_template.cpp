@@ -29,6 +29,9 @@ std::string si_of(const RecordedChannel& channel) try {
   return "";
 }
 
+/// Of an accelerometer the acceleration of gravity, to UDUNITS a gram.
+bool says_g(const RecordedChannel& channel) { return channel.unit == "g" || channel.unit == "G"; }
+
 /// What of a channel tells what it is.
 std::string words_of(const RecordedChannel& channel) { return in_small_letters(channel.name + " " + channel.label); }
 
@@ -41,7 +44,7 @@ std::string meaning_of(const RecordedChannel& channel) {
   if (si == "rad" || (unknown && says(words, {"alpha", "angle", "aoa", "incidence", "pitch", "winkel", "encoder"}))) return "alpha";
   if ((si == "N" || si == "V" || unknown) && says(words, {"hammer", "impact", "shaker"})) return "force";
   if (si == "N" || ((si == "V" || unknown) && says(words, {"gauge", "bridge", "load", "strain", "balance", "cell", "kraft", "lift", "force"}))) return "gauge";
-  if (si == "m/s^2" || si == "m.s-2") return "acc";
+  if (si == "m/s^2" || si == "m.s-2" || says_g(channel)) return "acc";
   return "";
 }
 
@@ -96,6 +99,7 @@ std::string column_text(const Named& column) {
   const bool gauge = column.name == "gauge" || column.name == "force";
   if (channel.unit.empty())
     text += fmt::format("# ? The file gives no unit; which is it?\nunit = \"{}\"\n", column.name == "alpha" ? "deg" : gauge ? "V" : column.name == "acc" ? "m/s^2" : "1");
+  if (says_g(channel)) text += "# ? \"g\" of an accelerometer is the acceleration of gravity; of a mass delete the next line.\nunit = \"gravity\"\n";
   if (gauge && (channel.unit.empty() || si_of(channel) == "V"))
     text += "# bridge.kind = \"full-1\"      # only for bridge.gauge_factor and bridge.excitation in place of a calibration with dead weights\n";
   return text;

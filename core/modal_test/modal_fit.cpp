@@ -37,11 +37,25 @@ int order_of(Response response) { return response == Response::velocity ? 1 : re
 /// A function ready to be fitted: angular frequency, (i w)^p, H and the standard deviation of its parts, up to a factor.
 struct Data {
   VectorXd w, sigma;
-  VectorXd relative;  ///< sigma over |H|, by the coherence
   VectorXcd factor, h;
   double scale = 1;  ///< of sigma
   bool measured_sigma = false;
 };
+
+/// Variance of real and imaginary part of each line. The mean over two neighbours to either side: that of a line alone has 2 (n - 1) degrees of freedom, and weights that scatter so make errors too small.
+VectorXd noise_of(const VectorXcd& h, const VectorXd& coherence, int averages) {
+  constexpr Index neighbours = 2;
+  VectorXd alone(h.size()), mean(h.size());
+  for (Index k = 0; k < h.size(); ++k) {
+    const double g = std::max(last_digit, coherence[k]), lost = std::max(last_digit, 1 - coherence[k]);
+    alone[k] = std::norm(h[k]) * lost / (2 * std::max(1, averages - 1) * g);
+  }
+  for (Index k = 0; k < h.size(); ++k) {
+    const Index first = std::max<Index>(0, k - neighbours), last = std::min(h.size(), k + neighbours + 1);
+    mean[k] = alone.segment(first, last - first).mean();
+  }
+  return mean;
+}
 
 Data data_of(const FrequencyResponse& f, int averages) {
   Data d;
@@ -49,17 +63,12 @@ Data data_of(const FrequencyResponse& f, int averages) {
   d.h = f.value;
   d.factor.resize(d.w.size());
   for (Index k = 0; k < d.w.size(); ++k) d.factor[k] = std::pow(complex<double>(0, d.w[k]), order_of(f.response));
-  const double n = std::max(1, averages);
   // A coherence of 1 throughout is that of a single blow and says nothing.
   d.measured_sigma = f.coherence.size() > 0 && f.coherence.minCoeff() < 1 - last_digit;
   d.sigma = VectorXd::Constant(d.w.size(), std::sqrt(d.h.squaredNorm() / static_cast<double>(d.h.size())));
   if (!d.measured_sigma) return d;
-  d.relative.resize(d.w.size());
-  for (Index k = 0; k < d.w.size(); ++k) {
-    const double g = std::max(last_digit, f.coherence[k]), lost = std::max(last_digit, 1 - f.coherence[k]);
-    d.relative[k] = std::sqrt(lost / (2 * n * g));
-    d.sigma[k] = std::max(std::abs(d.h[k]), 1e-12 * d.sigma[k]) * d.relative[k];
-  }
+  const VectorXd noise = noise_of(d.h, f.coherence, averages);
+  d.sigma = noise.cwiseMax(1e-24 * d.sigma.cwiseAbs2()).cwiseSqrt();
   return d;
 }
 
@@ -188,18 +197,6 @@ void settle_scales(std::vector<Data>& data, const VectorXd& x, int averages) {
   }
 }
 
-/// Weights by the fitted |H|: those by the measured one take a line for the better the lower its noise happened to make it.
-void weigh_by_the_fit(std::vector<Data>& data, const VectorXd& x) {
-  for (Data& d : data) {
-    if (!d.measured_sigma) continue;
-    const VectorXd left = solved(d, x, false).left;
-    for (Index k = 0; k < d.w.size(); ++k) {
-      const std::complex<double> fitted = d.h[k] - d.sigma[k] * d.scale * std::complex<double>(left[2 * k], left[2 * k + 1]);
-      d.sigma[k] = std::max(std::abs(fitted), 1e-3 * std::abs(d.h[k])) * d.relative[k];
-    }
-  }
-}
-
 struct Band {
   double low = std::numeric_limits<double>::infinity(), high = 0;  ///< rad/s
   bool holds(double w) const { return w > low && w < high; }
@@ -254,19 +251,31 @@ std::vector<double> candidates(const std::vector<Data>& data, const VectorXd& x,
   return found;
 }
 
-/// The poles with one more, where it explains most; none where none is found.
+/// The poles within the band alone.
+VectorXd inside_of(const Band& band, const VectorXd& x) {
+  VectorXd inside(2 * within(band, x));
+  Index at = 0;
+  for (Index k = 0; k < x.size() / 2; ++k)
+    if (band.holds(std::exp(x[2 * k]))) inside.segment(2 * at++, 2) = x.segment(2 * k, 2);
+  return inside;
+}
+
+/// The poles with one more, where it explains most; none where none is found. Poles that went out of the band on the way to it may stand for a mode within: it is tried without them too.
 std::optional<VectorXd> one_more(const std::vector<Data>& data, const VectorXd& x, const std::vector<FrequencyResponse>& functions) {
   std::optional<VectorXd> best;
   double best_bic = std::numeric_limits<double>::infinity();
   const Band band = band_of(data);
-  for (const double w : candidates(data, x, functions))
-    for (const double zeta : {0.002, 0.02}) {
-      VectorXd start(x.size() + 2);
-      start << x, std::log(w), std::log(zeta);
-      const VectorXd end = searched(data, start, Search::first_look);
-      if (!end.allFinite() || !sensible(band, end)) continue;
-      if (const double bic = bic_of(data, end); bic < best_bic) best = end, best_bic = bic;
-    }
+  std::vector<VectorXd> from{x};
+  if (within(band, x) < x.size() / 2) from.push_back(inside_of(band, x));
+  for (const VectorXd& poles : from)
+    for (const double w : candidates(data, poles, functions))
+      for (const double zeta : {0.002, 0.02}) {
+        VectorXd start(poles.size() + 2);
+        start << poles, std::log(w), std::log(zeta);
+        const VectorXd end = searched(data, start, Search::first_look);
+        if (!end.allFinite() || !sensible(band, end)) continue;
+        if (const double bic = bic_of(data, end); bic < best_bic) best = end, best_bic = bic;
+      }
   if (!best) return best;
   const VectorXd end = searched(data, *best, Search::to_the_end);
   if (end.allFinite() && sensible(band, end)) best = end;
@@ -307,13 +316,12 @@ VectorXd ascending(const VectorXd& x) {
   return sorted;
 }
 
-/// To all digits, weights and scales with it; poles ascending.
+/// To all digits, scales with it; poles ascending.
 VectorXd settled(std::vector<Data>& data, VectorXd x, int averages) {
-  constexpr int rounds = 3;  // each brings the weights closer by the square of a line's error
+  constexpr int rounds = 2;  // scales follow what is left
   for (int round = 0; round < rounds; ++round) {
     settle_scales(data, x, averages);
     x = searched(data, x, Search::to_the_end);
-    weigh_by_the_fit(data, x);
   }
   settle_scales(data, x, averages);
   return ascending(x);

@@ -19,10 +19,10 @@ struct FittedMode {
 ///
 /// with p = 0 of displacements and gauges, 1 of velocities, 2 of accelerations; u and l stand for modes far above and below, poles outside of the band for near ones. Real and imaginary part of a line have the standard deviation
 ///
-///   |H| sqrt((1 - g^2) / (2 n g^2))
+///   |H| sqrt((1 - g^2) / (2 (n - 1) g^2))
 ///
-/// of coherence g^2 and n averages (J. S. Bendat and A. G. Piersol, Random Data, 4th ed. (2010), section 9.2.3), where the coherence was measured; else one for all lines, in each function what it leaves. All are then scaled
-/// so that the reduced chi-square is one, but never below what n averages say. Lines count as independent.
+/// of coherence g^2, estimated from the same n averages, where it was measured (J. S. Bendat and A. G. Piersol, Random Data, on errors of frequency response estimates; n - 1 for n, since the estimate of g^2 is too high by that).
+/// Its square is the mean over five lines. Else it is one for all lines, in each function what it leaves. All are then scaled so that the reduced chi-square is one, but never below what n averages say. Lines count as independent.
 struct ModalFit {
   std::vector<FittedMode> modes;         ///< ascending
   Eigen::MatrixXd covariance;            ///< of modes x (frequency, damping ratio, residues)

@@ -52,7 +52,7 @@ void check_sensor_unit(const Run& run, const Sensor& sensor, const Rig& rig) {
   const bool raw = column.unit == "V" || column.unit == "1";
   if (raw || sensor.unit.empty() || column.unit == si_unit(sensor.unit, place, sensor.column)) return;
   throw InputError(place, fmt::format("the column \"{}\" is in {}", sensor.column, column.file_unit), fmt::format("wanted a unit of {}, which the sensor of the rig {} reads", sensor.unit, rig.file),
-                   "Correct the unit, or the sensor's gain in the rig file.");
+                   column.file_unit == "g" && sensor.unit == "m/s^2" ? "g is the gram; as a multiple of the acceleration of gravity the unit is called gravity." : "Correct the unit, or the sensor's gain in the rig file.");
 }
 
 /// Median of the first samples: the angle before the shaft moves.

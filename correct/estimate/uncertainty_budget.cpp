@@ -74,6 +74,19 @@ MatrixXd roughness_of(const MatrixXd& motion_prior, const MatrixXd& c_rows) { re
 
 }  // namespace
 
+MatrixXd variance_shares(const MatrixXd& by_source, const VectorXd& of_givens) {
+  MatrixXd shares = MatrixXd::Zero(by_source.rows(), static_cast<Index>(share_names.size()));
+  const auto variance = [&](Source s) -> VectorXd { return by_source.col(static_cast<Index>(s)).cwiseAbs2(); };
+  shares.col(0) = variance(Source::gauge);
+  shares.col(1) = variance(Source::angle);
+  shares.col(2) = variance(Source::calibration);
+  if (of_givens.size() > 0) shares.col(4) = of_givens.cwiseAbs2();
+  shares.col(3) = (variance(Source::rig) - shares.col(4)).cwiseMax(0);
+  shares.col(5) = variance(Source::regularisation);
+  const VectorXd whole = shares.rowwise().sum();
+  return shares.array().colwise() / whole.array();
+}
+
 ThetaKnown theta_known(const RunResidual& residual, const RunResidual::Evaluation& e, const MatrixXd& motion_prior) {
   const MatrixXd& S = e.linear_slope;
   const MatrixXd rough = roughness_of(motion_prior, S);

@@ -14,6 +14,13 @@ enum class Source { gauge, angle, calibration, rig, regularisation };
 constexpr std::array source_names{"gauge", "angle", "calibration", "rig", "regularisation"};
 constexpr Eigen::Index sources = source_names.size();
 
+/// The error budget of a load: what each part of its variance comes to, the rig's in two.
+inline constexpr std::array share_names{"gauge", "angle", "calibration", "parameters", "givens", "regularisation"};
+
+/// Shares of the variance, one row per sample as in `share_names`, 0 to 1. Rows sum to one, and are NaN where the load is exact.
+/// `of_givens`: what stated uncertainties make of the rig's part [unit of by_source]; empty: nothing is stated.
+Eigen::MatrixXd variance_shares(const Eigen::MatrixXd& by_source, const Eigen::VectorXd& of_givens);
+
 /// Standard deviations of quantities, one per row.
 struct UncertaintyBySource {
   Eigen::VectorXd std;          ///< total: root of the sum of squares

@@ -188,6 +188,9 @@ ModalLoad modal_load(const CorrectProblem& problem) {
   return result;
 }
 
+constexpr std::array<std::size_t, 4> shares_there{0, 2, 3, 5};  // of share_names: there is no angle, and what the rig file states is not allowed for
+static_assert(share_names[0] == std::string_view("gauge") && share_names[2] == std::string_view("calibration") && share_names[3] == std::string_view("parameters"));
+
 std::string to_csv(const ModalLoad& r, const MadeBy& made_by) {
   return whole_text([&](const TextSink& sink) { to_csv(sink, r, made_by); });
 }
@@ -197,6 +200,7 @@ void to_csv(const TextSink& sink, const ModalLoad& r, const MadeBy& made_by) {
   for (Index s = 0; s < sources; ++s)
     if (s != static_cast<Index>(Source::angle)) text += fmt::format(",normal_force_std_{} [{}]", source_names[static_cast<std::size_t>(s)], r.unit);
   text += fmt::format(",normal_force_band95 [{0}],normal_force_half_weight [{0}],normal_force_twice_weight [{0}],from_inputs [{0}]", r.unit);
+  for (const std::size_t share : shares_there) text += fmt::format(",normal_force_share_{}", share_names[share]);
   const HowFarToTrust trust{std::nan(""), r.warnings, {}, made_by};
   sink(text + trust.header() + "\n");
   const std::string last_cells = trust.cells();
@@ -208,7 +212,13 @@ void to_csv(const TextSink& sink, const ModalLoad& r, const MadeBy& made_by) {
     fmt::format_to(out, ",{:.6g},{:.4g}", r.load[k], r.std[k]);
     for (Index s = 0; s < sources; ++s)
       if (s != static_cast<Index>(Source::angle)) fmt::format_to(out, ",{:.3g}", r.by_source(k, s));
-    fmt::format_to(out, ",{:.4g},{:.6g},{:.6g},{:.6g}{}\n", r.simultaneous * r.std[k], r.half_weight[k], r.twice_weight[k], r.from_inputs[k], last_cells);
+    fmt::format_to(out, ",{:.4g},{:.6g},{:.6g},{:.6g}", r.simultaneous * r.std[k], r.half_weight[k], r.twice_weight[k], r.from_inputs[k]);
+    const MatrixXd shares = variance_shares(r.by_source.row(k), {});
+    for (const std::size_t share : shares_there) {
+      const double here = shares(0, static_cast<Index>(share));
+      std::isfinite(here) ? fmt::format_to(out, ",{:.6f}", here) : fmt::format_to(out, ",");
+    }
+    fmt::format_to(out, "{}\n", last_cells);
     sink(text);
   }
 }

@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <map>
 #include <optional>
 #include <set>
 #include <utility>
@@ -15,6 +16,7 @@
 #include "core/files/units.h"
 #include "core/model/wagner.h"
 #include "correct/estimate/how_far_to_trust.h"
+#include "correct/estimate/uncertainty_budget.h"
 #include "correct/report/fit_traces.h"
 #include "correct/report/result_files.h"
 #include "correct/report/rig_sections.h"
@@ -98,6 +100,35 @@ std::optional<std::pair<double, double>> without_spike(const VectorXd& gauge, co
   return std::pair{bottom - margin, top + margin};
 }
 
+/// Error budget of a load: its variance over time by where it comes from, and the same in numbers. Nothing where an earlier version wrote the table.
+void add_budget(ReportPage& page, const CsvTable& table, const std::string& load, const std::string& called, const std::string& group) {
+  static const std::map<std::string, std::string> meaning{{"gauge", "noise of the gauge"}, {"angle", "noise of the angle"}, {"calibration", "calibration of the gauge"}, {"parameters", "parameters of the fit"},
+                                                          {"givens", "stated numbers of rig file and head"}, {"regularisation", "regularisation"}};
+  const CsvColumn &time = column(table, "time"), &std = column(table, (load + "_std").c_str());
+  Plot plot{"Error budget of the " + called, labelled("time", time.unit), "share of the variance", time.value, {}, group};
+  std::vector<std::string> header{"", "time", "standard deviation"};
+  for (std::size_t s = 0; s < share_names.size(); ++s) {
+    const CsvColumn* share = find(table, load + "_share_" + share_names[s]);
+    if (constexpr double seen = 5e-4; !share || !(share->value.array() > seen).any()) continue;
+    plot.curves.push_back({meaning.at(share_names[s]), static_cast<int>(s), share->value});
+    header.push_back(meaning.at(share_names[s]));
+  }
+  if (plot.curves.empty()) return;
+  plot.stacked = true;
+  plot.height = 220;
+  plot.caption = "How much of the band's variance (one standard deviation squared) at each time comes from what; the shares sum to one. The error of the gauge's zero is in its noise. What is not named here has less than 0.05 % of it throughout.";
+  page.add_plot(plot);
+  Index widest = 0;
+  std.value.maxCoeff(&widest);
+  const Index last = time.value.size() - 1;
+  std::vector<std::vector<std::string>> rows;
+  for (const auto& [where, k] : std::vector<std::pair<std::string, Index>>{{"at the start", 0}, {"where the band is widest", widest}, {"at the end", last}}) {
+    rows.push_back({where, plain(time.value[k], 4) + " " + time.unit, plain(std.value[k], 3) + " " + std.unit});
+    for (const Curve& curve : plot.curves) rows.back().push_back(std::isfinite(curve.value[k]) ? fmt::format("{:.1f} %", 100 * curve.value[k]) : "—");
+  }
+  page.add_table("", header, rows);
+}
+
 /// What a table was made from, as far as its files are found and have not changed since.
 struct Origin {
   std::optional<Rig> rig;
@@ -177,9 +208,17 @@ void add_corrected(ReportPage& page, const std::string& text, const std::string&
                    "What neither the load nor the rig's answer to it accounts for. More than noise here is missing from the load above.", false, false, 180, {}, gauge.value});
   page.add_plot({"Gauge and the circulatory part of the load", time_label, labelled("load", circulatory.unit), t,
                  {{"gauge reading", 0, gauge.value}, {"circulatory load", 2, circulatory.value, band_of(circulatory_std.value, of_circulatory)}}, name, caption_of_band(of_circulatory)});
+  add_budget(page, table, "circulatory", "circulatory load", name);
+  add_budget(page, table, "normal_force", "load of a rigid rig", name);
   const CsvColumn &cn = column(table, "cn"), &cn_std = column(table, "cn_std");
-  page.add_plot({"Normal-force coefficient", "time [semichords since the motion began]", "C_N", increasing(table, column(table, "semichords")),
-                 {{"C_N", 1, cn.value, band_of(cn_std.value, of_load)}}, "", caption_of_band(of_load)});
+  Plot coefficient{"Normal-force coefficient", "time [semichords since the motion began]", "C_N", increasing(table, column(table, "semichords")),
+                   {{"C_N", 1, cn.value, band_of(cn_std.value, of_load)}}, "", caption_of_band(of_load)};
+  Index largest = 0;
+  if (load.value.cwiseAbs().maxCoeff(&largest) > 0) {
+    const VectorXd of_circulation = circulatory.value * (cn.value[largest] / load.value[largest]);
+    coefficient.y_range = without_spike(of_circulation, of_circulation, cn.value);
+  }
+  page.add_plot(coefficient);
   add_spectra(page, "Spectra before and after the correction", dt, load.unit, {"gauge reading", 0, gauge.value}, {"rigid-rig load", 1, load.value, {}, true},
               "Amplitude of the whole record, mean removed, Hann window. What the rig adds stands in the reading only.", modes);
 }
@@ -207,6 +246,7 @@ void add_modal_load(ReportPage& page, const std::string& text, const std::string
                  {{"gauge reading", 0, gauge.value}, {"from the measured inputs", 2, inputs.value}}, name, "Inputs are the motion of the mount and a measured force."});
   page.add_plot({"The load alone", time_label, labelled("load", load.unit), t, {{"rigid-rig load", 1, load.value, band_of(load_std.value, of_load)}}, name,
                  "With its band, on a scale of its own. The load is smoothed as far as the noise demands: what is faster than its bandwidth is left out."});
+  add_budget(page, table, "normal_force", "load", name);
   add_spectra(page, "Spectra before and after the correction", dt, load.unit, {"gauge reading", 0, gauge.value}, {"reading less what the inputs do", 1, gauge.value - inputs.value},
               "Amplitude of the whole record, mean removed, Hann window. What stands out of both is a load, or a mode that the rig file does not have.");
 }

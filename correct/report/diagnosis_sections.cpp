@@ -383,6 +383,9 @@ void add_diagnosis(ReportPage& page, const json& result, const std::string& path
     for (const std::string& name : models->after.runs)
       if (const auto file = found_file(name, path, options)) found.push_back(read_run(*file));
     for (const Run& run : found) tell_conditions(page, models->rig, models->after, run);
+    for (const json& run : member(improvement, "runs", json::array()))
+      if (const std::string name = text_of(run, "file"); std::find(models->after.runs.begin(), models->after.runs.end(), name) == models->after.runs.end())
+        if (const auto file = found_file(name, path, options)) tell_conditions(page, models->rig, models->after, read_run(*file));  // held out
     add_fitted_rig(page, models->rig, models->after, found);
   }
   std::string drawn;  // a run has one entry for each of its channels

@@ -97,6 +97,18 @@ const unrigDrawing = (() => {
     }
   }
 
+  // Shares of a whole: the last at the bottom, each on those that follow it.
+  function stack(svg, block, px, py, look) {
+    const rows = block.x.map((_, k) => k).filter((k) => block.series.every((s) => s.v[k] !== null));
+    let below = rows.map(() => 0);
+    for (const s of [...block.series].reverse()) {
+      const above = rows.map((k, i) => below[i] + s.v[k]);
+      const edge = (y) => rows.map((k, i) => `${px(block.x[k]).toFixed(2)} ${py(y[i]).toFixed(2)}`);
+      element('polygon', svg, {points: [...edge(above), ...edge(below).reverse()].join(' '), fill: look.series[s.colour], 'fill-opacity': 0.75, class: 'share'});
+      below = above;
+    }
+  }
+
   // Names of marks in up to three rows; one that finds no room is left out, its line stays.
   function rows_of_names(marks, place, width_of) {
     const ends = [-Infinity, -Infinity, -Infinity];
@@ -143,7 +155,8 @@ const unrigDrawing = (() => {
       element('line', inner, {x1: px(m.x), x2: px(m.x), y1: box.top, y2: box.top + box.h, stroke: look.mark, 'stroke-dasharray': '3 4'});
       if (rows[i] >= 0) element('text', inner, {x: Math.min(px(m.x) + 4, box.left + box.w - 6.5 * m.name.length), y: box.top + 14 + 14 * rows[i], 'font-size': 12, fill: look.mark}, m.name);
     });
-    for (const s of block.series) curve(inner, block, s, px, py, look.series[s.colour]);
+    if (block.stacked) stack(inner, block, px, py, look);
+    else for (const s of block.series) curve(inner, block, s, px, py, look.series[s.colour]);
     return svg;
   }
 

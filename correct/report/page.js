@@ -4,8 +4,8 @@
   const data = JSON.parse(document.getElementById('report-data').textContent);
   // Okabe and Ito's colours, which the common kinds of colour blindness keep apart; lighter ones on dark ground. Dashes tell series apart too.
   const palette = {
-    light: {ink: '#1b1b1b', line: '#d5d5d5', mark: '#5a5a5a', bad: '#a33f00', empty: '#c4c8cc', series: ['#4a4a4a', '#0072b2', '#d55e00', '#00795a', '#a8518a']},
-    dark: {ink: '#e8e8e6', line: '#3a4046', mark: '#a9adb0', bad: '#f0a04b', empty: '#3a4046', series: ['#d8d8d8', '#56b4e9', '#e69f00', '#2fc89a', '#e39bc4']},
+    light: {ink: '#1b1b1b', line: '#d5d5d5', mark: '#5a5a5a', bad: '#a33f00', empty: '#c4c8cc', series: ['#4a4a4a', '#0072b2', '#d55e00', '#00795a', '#a8518a', '#e3b505']},
+    dark: {ink: '#e8e8e6', line: '#3a4046', mark: '#a9adb0', bad: '#f0a04b', empty: '#3a4046', series: ['#d8d8d8', '#56b4e9', '#e69f00', '#2fc89a', '#e39bc4', '#f0e442']},
   };
   const report = {graphs: {}, pictures: {}, figures: {}, redraw: [], theme: 'system', printing: false};
   window.unrigReport = report;
@@ -141,6 +141,28 @@
     };
   }
 
+  // Shares of a whole, the last at the bottom. Dygraphs' own stacks leave out the top one of long records.
+  function stack(block) {
+    return (e) => {
+      if (e.seriesIndex !== 0) return;  // all at once
+      const context = e.drawingContext, sets = e.allSeriesPoints, x = sets[0].map((point) => point.canvasx);
+      const rows = x.map((_, k) => k).filter((k) => sets.every((points) => isFinite(points[k].yval)));
+      let below = x.map(() => 0);
+      context.save();
+      context.globalAlpha = 0.75;
+      for (let s = sets.length - 1; s >= 0; --s) {
+        const under = below, above = under.map((y, k) => y + sets[s][k].yval);
+        context.fillStyle = colours().series[block.series[s].colour];
+        context.beginPath();
+        for (const k of rows) context.lineTo(x[k], e.dygraph.toDomYCoord(above[k]));
+        for (const k of [...rows].reverse()) context.lineTo(x[k], e.dygraph.toDomYCoord(under[k]));
+        context.fill();
+        below = above;
+      }
+      context.restore();
+    };
+  }
+
   const groups = {};  // name -> graphs that zoom together
   function follow(group) {
     let busy = false;
@@ -187,9 +209,9 @@
       labelsSeparateLines: false, axisLabelFontSize: 13, highlightCircleSize: 3, connectSeparatedPoints: false, logscale: !!block.log_y,
       axes: {
         x: {axisLabelFormatter: readable, valueFormatter: readable, logscale: !!block.log_x, axisLabelWidth: 70, ticker: block.log_x ? decades : Dygraph.numericLinearTicks},
-        y: {axisLabelFormatter: readable, valueFormatter: readable, axisLabelWidth: 72, ticker: block.log_y ? decades : Dygraph.numericLinearTicks, valueRange: block.y_range || null},
+        y: {axisLabelFormatter: readable, valueFormatter: readable, axisLabelWidth: 72, ticker: block.log_y ? decades : Dygraph.numericLinearTicks, valueRange: block.stacked ? [0, 1] : block.y_range || null},
       },
-    }, look(), block.marks || block.boxes ? {underlayCallback: underlay(block)} : {}, block.group ? follow(block.group) : {}));
+    }, look(), block.stacked ? {plotter: stack(block), highlightCircleSize: 0} : {}, block.marks || block.boxes ? {underlayCallback: underlay(block)} : {}, block.group ? follow(block.group) : {}));
     if (block.group) (groups[block.group] = groups[block.group] || []).push(graph);
     report.graphs[name] = graph;
     const range = () => ({x: graph.xAxisRange(), y: graph.yAxisRange()});

@@ -24,13 +24,14 @@ namespace {
 
 using nlohmann::json;
 
-constexpr const char* wanted = "wanted what `unrig fit`, `apparent-mass`, `diagnose`, `trial`, `batch`, `correct` or `simulate` wrote with -o or --indicial";
+constexpr const char* wanted = "wanted what `unrig check`, `fit`, `apparent-mass`, `diagnose`, `trial`, `batch`, `correct` or `simulate` wrote with -o or --indicial";
 
 void add_json(ReportPage& page, const std::string& text, const std::string& path, const ReportOptions& options) {
   const json result = json::parse(text, nullptr, false);
   if (result.is_discarded()) throw InputError({path, 0}, "not valid JSON", wanted, "");
   const std::string kind = text_of(result, "unrig");
   try {
+    if (kind == "check") return add_check(page, result, path, options);
     if (kind == "fit") return add_fit(page, result, path, options);
     if (kind == "apparent-mass") return add_apparent_mass(page, result, path, options);
     if (kind == "diagnosis") return add_diagnosis(page, result, path, options);
@@ -100,7 +101,7 @@ int report_command(int argc, char** argv) {
   std::vector<std::string> results;
   std::string output, title;
   ReportOptions options;
-  app.add_option("results", results, "fit.json, apparent.json, diagnosis.json, trial.json, batch.json, corrected.csv, indicial.csv, simulated.csv, in any number and order")->required();
+  app.add_option("results", results, "check.json, fit.json, apparent.json, diagnosis.json, trial.json, batch.json, corrected.csv, indicial.csv, simulated.csv, in any number and order")->required();
   app.add_option("-o,--output", output, "report (HTML)")->required();
   app.add_option("--data", options.data_folder, "folder of the recordings and the rig, where they are no longer at the paths that the results name");
   app.add_option("--title", title, "title of the page, in place of the files' names");

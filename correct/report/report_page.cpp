@@ -146,6 +146,7 @@ void ReportPage::add_plot(const Plot& plot) {
     block["series"].push_back(series);
   }
   for (const Box& box : plot.boxes) block["boxes"].push_back({{"from", rounded(box.from)}, {"to", rounded(box.to)}, {"name", box.name}});
+  if (plot.stacked) block["stacked"] = true;
   if (plot.y_range) block["y_range"] = {rounded(plot.y_range->first), rounded(plot.y_range->second)};
   for (const auto& [x, name] : plot.marks) block["marks"].push_back({{"x", rounded(x)}, {"name", name}});
   push(block);

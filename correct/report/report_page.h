@@ -41,6 +41,7 @@ struct Plot {
   Eigen::VectorXd busy = {};     ///< a long record keeps its detail where this varies, as long as x; empty: where its curves do
   std::vector<Box> boxes = {};
   std::optional<std::pair<double, double>> y_range = {};  ///< what the axis shows at first; a button shows all
+  bool stacked = false;          ///< shares of a whole, each on those that follow it, filled: curves without bands, of values from 0 to 1
 };
 
 /// A rectangle on a map.

@@ -46,6 +46,8 @@ std::string labelled(const std::string& name, const std::string& unit);
 void add_fit(ReportPage& page, const nlohmann::json& result, const std::string& path, const ReportOptions& options);
 void add_apparent_mass(ReportPage& page, const nlohmann::json& result, const std::string& path, const ReportOptions& options);
 void add_diagnosis(ReportPage& page, const nlohmann::json& result, const std::string& path, const ReportOptions& options);
+/// What `unrig check` found, with a picture of the rig and its mode shapes where its file is found.
+void add_check(ReportPage& page, const nlohmann::json& result, const std::string& path, const ReportOptions& options);
 void add_trial(ReportPage& page, const nlohmann::json& result, const std::string& path);
 /// A table with a row for each run of a batch, called `name`.
 void add_batch(ReportPage& page, const BatchResult& result, const std::string& name);

@@ -107,12 +107,8 @@ void add_responses(ReportPage& page, const Rig& rig, const FittedRig& fit, const
   page.add_table("Modes and usable band of the gauge", {"in", "modes [Hz]", "within 5 % up to [Hz]"}, rows, "Of the fitted rig, up to half the sampling rate.");
 }
 
-void add_shapes(ReportPage& page, const Rig& rig, const FittedRig& fit, const Run& run) {
+void add_shapes(ReportPage& page, const Rig& rig, const Basis& basis, const NaturalFrequencies& natural, const std::string& caption) {
   constexpr Index shown = 5;
-  const FittedModel fitted = fitted_model(rig, fit, run);
-  const Basis& basis = fitted.model.basis();
-  const auto value = [&](const char* name) { return fitted.theta[fitted.model.index(name)]; };
-  const NaturalFrequencies natural = natural_frequencies(undamped_system(fitted.rig, basis, run.density), {value("normal.stiffness_scale"), value("torsion.stiffness_scale"), value("apparent_mass_coefficient")});
   Plot bending{"Mode shapes: displacement", "distance from the clamp [m]", "displacement", rig.station, {}, "mode shapes"}, twist = bending;
   twist.title = "Mode shapes: twist";
   twist.y_label = "twist × semichord";
@@ -126,13 +122,59 @@ void add_shapes(ReportPage& page, const Rig& rig, const FittedRig& fit, const Ru
     bending.curves.push_back({name, static_cast<int>(k), h / scale, {}, k % 2 == 1});
     twist.curves.push_back({name, static_cast<int>(k), turn / scale, {}, k % 2 == 1});
   }
-  bending.caption = twist.caption = fmt::format("Undamped, at rest in {}, with the fitted stiffness and apparent mass. One scale for displacement and twist times semichord, of which the larger is 1.", in_words(run).substr(0, in_words(run).find(',')));
+  bending.caption = twist.caption = caption + " One scale for displacement and twist times semichord, of which the larger is 1.";
   bending.height = twist.height = 220;
   page.add_plot(bending);
   page.add_plot(twist);
 }
 
+void add_fitted_shapes(ReportPage& page, const Rig& rig, const FittedRig& fit, const Run& run) {
+  const FittedModel fitted = fitted_model(rig, fit, run);
+  const auto value = [&](const char* name) { return fitted.theta[fitted.model.index(name)]; };
+  const NaturalFrequencies natural =
+      natural_frequencies(undamped_system(fitted.rig, fitted.model.basis(), run.density), {value("normal.stiffness_scale"), value("torsion.stiffness_scale"), value("apparent_mass_coefficient")});
+  add_shapes(page, rig, fitted.model.basis(), natural, fmt::format("Undamped, at rest in {}, with the fitted stiffness and apparent mass.", in_words(run).substr(0, in_words(run).find(','))));
+}
+
 }  // namespace
+
+void add_drawing(ReportPage& page, const Rig& rig) {
+  if (rig.is_modal() || rig.station.size() < 2) return;
+  const Index n = rig.station.size();
+  const double ahead = -rig.pitch_axis * rig.chord, aft = (1 - rig.pitch_axis) * rig.chord, half = rig.strip_length / 2;
+  // Elements, and the edges of the strips a hair inside and outside of them.
+  std::set<double> places{0.0};
+  for (const double s : rig.station) places.insert(s);
+  for (const int element : rig.submerged)
+    for (const double side : {-1.0, 1.0})
+      for (const double hair : {0.999, 1.001}) places.insert(std::max(0.0, rig.station[element - 1] + side * hair * half));
+  const std::vector<double> sorted(places.begin(), places.end());
+  const VectorXd x = Eigen::Map<const VectorXd>(sorted.data(), static_cast<Index>(sorted.size()));
+  const VectorXd none = VectorXd::Constant(x.size(), std::nan(""));
+  VectorXd leading = none, trailing = none, elements = none, masses = none;
+  for (Index k = 0; k < x.size(); ++k) {
+    const auto in = [&](int element) { return std::abs(x[k] - rig.station[element - 1]) <= half; };
+    if (std::any_of(rig.submerged.begin(), rig.submerged.end(), in)) leading[k] = ahead, trailing[k] = aft;
+    for (Index i = 0; i < n; ++i)
+      if (x[k] == rig.station[i]) elements[k] = 0, masses[k] = rig.mass_centre[i];
+  }
+  Plot plot{"The rig", "distance from the clamp [m]", "aft of the pitch axis [m]", x,
+            {{"pitch axis", 0, VectorXd::Zero(x.size())}, {"leading edge", 1, leading}, {"trailing edge", 1, trailing, {}, true}, {"elements", 0, elements, {}, false, true}, {"mass centres", 2, masses, {}, false, true}}};
+  plot.curves[1].name = "leading edge of the strips";
+  plot.curves[2].name = "their trailing edge";
+  if (rig.gauge_element > 0) plot.marks.emplace_back(rig.station[rig.gauge_element - 1], "gauge");
+  if (rig.calibration_element > 0) plot.marks.emplace_back(rig.station[rig.calibration_element - 1], "calibration");
+  for (const Sensor& s : rig.sensors) plot.marks.emplace_back(rig.station[std::min<Index>(s.element, n) - 1], s.column);
+  std::sort(plot.marks.begin(), plot.marks.end());
+  plot.caption = "Seen along the normal force, the clamp at the left; the two axes have their own scales.";
+  page.add_plot(plot);
+}
+
+void add_described_shapes(ReportPage& page, const Rig& rig, double nyquist) {
+  if (rig.is_modal()) return;
+  const Basis basis = make_basis(rig, nyquist, 0);
+  add_shapes(page, rig, basis, natural_frequencies(undamped_system(rig, basis, 0), {1, 1, 1}), "Undamped, in vacuum, as the rig file describes it.");
+}
 
 void tell_conditions(ReportPage& page, const Rig& rig, const FittedRig& fit, const Run& run) {
   page.tell_rig(fmt::format("{} ({})", rig.name.empty() ? file_name(rig.file) : rig.name, rig.file));
@@ -191,7 +233,7 @@ void add_fitted_rig(ReportPage& page, const Rig& rig, const FittedRig& fit, cons
   add_responses(page, rig, fit, runs);
   if (rig.is_modal()) return;
   const auto densest = std::max_element(runs.begin(), runs.end(), [](const Run& a, const Run& b) { return a.density < b.density; });
-  add_shapes(page, rig, fit, *densest);
+  add_fitted_shapes(page, rig, fit, *densest);
 }
 
 }  // namespace unrig

@@ -24,6 +24,10 @@ struct RigResponse {
 };
 RigResponse rig_response(const Rig& rig, const FittedRig& fit, const Run& run);
 
+/// A rig as its file describes it: seen along the normal force, elements, strips, mass centres, gauge, sensors; and the shapes of its lowest modes below `nyquist` [Hz], in vacuum. Nothing of a rig known only as modes.
+void add_drawing(ReportPage& page, const Rig& rig);
+void add_described_shapes(ReportPage& page, const Rig& rig, double nyquist);
+
 /// The fitted rig: its frequency response with the band in which the gauge reads the load itself, in each fluid and stream of the runs, and the shapes of its lowest modes.
 void add_fitted_rig(ReportPage& page, const Rig& rig, const FittedRig& fit, const std::vector<Run>& runs);
 

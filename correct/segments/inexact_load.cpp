@@ -67,10 +67,12 @@ Answer change_along(const FinishedCorrection& done, const FittedNumbers::Directi
   return change;
 }
 
-void widen(const MatrixXd& changes, VectorXd& std, MatrixXd& by_source) {
+/// Returns what the changes come to.
+VectorXd widen(const MatrixXd& changes, VectorXd& std, MatrixXd& by_source) {
   auto rig = by_source.col(static_cast<Index>(Source::rig));
   rig = (rig.array().square() + changes.rowwise().squaredNorm().array()).sqrt().matrix().eval();
   std = by_source.rowwise().norm();
+  return changes.rowwise().norm();
 }
 
 }  // namespace
@@ -99,8 +101,8 @@ void add_numbers(const FinishedCorrection& done, CorrectResult& result) {
   const Eigen::RowVectorXd slope = row(&Answer::slope), force = row(&Answer::force_per_coefficient);
   const MatrixXd coefficient = (normal_force - here.normal_force * force / here.force_per_coefficient) / here.force_per_coefficient;
   result.coefficient_std = ((result.normal_force.std / here.force_per_coefficient).array().square() + coefficient.rowwise().squaredNorm().array()).sqrt();
-  widen(columns(&Answer::circulatory), result.circulatory.std, result.circulatory.by_source);
-  widen(normal_force, result.normal_force.std, result.normal_force.by_source);
+  result.circulatory.of_givens = widen(columns(&Answer::circulatory), result.circulatory.std, result.circulatory.by_source);
+  result.normal_force.of_givens = widen(normal_force, result.normal_force.std, result.normal_force.by_source);
   widen(indicial, result.indicial.uncertainty.std, result.indicial.uncertainty.by_source);
   const MatrixXd per_radian = here.slope * indicial + here.indicial * slope;
   result.indicial.per_radian_std = (result.indicial.per_radian_std.array().square() + per_radian.rowwise().squaredNorm().array()).sqrt().matrix().eval();

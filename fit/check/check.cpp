@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "core/files/error.h"
+#include "core/files/text_file.h"
 
 namespace unrig {
 namespace {
@@ -16,8 +17,11 @@ void foresee(const Rig& rig, const std::vector<Run>& runs, Checked& checked) {
   }
   try {
     checked.foreseen = foresee(rig, runs);
-  } catch (const InputError& e) {
-    checked.not_foreseen = e.what();
+  } catch (const InputError& e) {  // what a fit would refuse
+    checked.not_foreseen = "not looked at, since a fit refuses the input";
+    const std::string text = e.what();
+    const auto run = std::find_if(runs.begin(), runs.end(), [&](const Run& r) { return text.starts_with(r.file); });
+    checked.suspicions.push_back({base_name(run == runs.end() ? rig.file : run->file), {text}, 1, 0, true, text});
   } catch (const NoAnswer& e) {
     checked.not_foreseen = e.what();
   }

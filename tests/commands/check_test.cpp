@@ -176,6 +176,25 @@ TEST_F(Check, CountsClippedReadingsAndGoesOn) {
   EXPECT_THAT(finished.err, ::testing::ContainsRegex("check: wet_pluck.csv: [0-9]+ of 2500 readings of the gauge are clipped"));
 }
 
+TEST_F(Check, NamesWhatAFitWouldRefuse) {
+  for (const auto& [change, said] : {std::pair{replaced("alpha \\[deg\\]", "angle [deg]"), "step_a.csv:7: a step without a column \"alpha\"; there is a column \"angle\""},
+                                     std::pair{replaced("gauge \\[N\\]", "gauge [V]"), "step_a.csv:7: the column \"gauge\" is in V"}}) {
+    const Finished finished = check(campaign(change, {"step_a"}));
+    EXPECT_EQ(finished.status, 1) << finished.err;
+    EXPECT_THAT(finished.err, ::testing::ContainsRegex("check: .*step_a.csv:7")) << said;
+    EXPECT_THAT(finished.err, HasSubstr(said));
+  }
+}
+
+TEST_F(Check, NamesARecordThatIsNoRecord) {
+  const Finished still = check(campaign([](const std::string& text) { return with_rows(text, [](std::vector<double>& row) { row[gauge] = 6.5; }); }, {"step_a"}));
+  EXPECT_EQ(still.status, 1);
+  EXPECT_THAT(still.err, HasSubstr("check: step_a.csv: 3000 of 3000 readings of the gauge are one and the same"));
+  const Finished cut = check(campaign([](const std::string& text) { return text.substr(0, text.find("\n0.014,") + 1); }, {"step_a"}));
+  EXPECT_EQ(cut.status, 0) << cut.err;
+  EXPECT_THAT(cut.err, HasSubstr("check: step_a.csv: 7 samples, 0.014 s, are 0.041 periods of the rig"));
+}
+
 TEST_F(Check, StopsFitDiagnoseAndCorrectBeforeTheySearch) {
   const std::vector<std::string> files = campaign(times(gauge, 4.4482216152605), {"step_b"});
   const std::string out = directory.path("out.json");

@@ -8,6 +8,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <map>
+#include <regex>
 
 #include <fmt/format.h>
 
@@ -456,6 +457,51 @@ TEST(Report, SaysWhereARecordingIsNotTheOneThatWasFitted) {
   EXPECT_EQ(changed.status, 0);
   EXPECT_THAT(changed.err, HasSubstr(name + "\" has other readings"));
   EXPECT_THAT(read_text(output), HasSubstr("has other readings"));
+}
+
+TEST(Report, StacksTheErrorBudgetOfALoad) {
+  const TemporaryDirectory directory;
+  make_results(directory);
+  const std::string output = directory.path("report.html");
+  ASSERT_EQ(run_unrig(directory, {"report", directory.path("corrected.csv"), "-o", output}).status, 0);
+  const json data = page_data(output);
+  for (const char* load : {"circulatory load", "load of a rigid rig"}) {
+    const json* plot = plot_titled(data, std::string("Error budget of the ") + load);
+    ASSERT_NE(plot, nullptr) << load;
+    EXPECT_TRUE(plot->at("stacked").get<bool>());
+    for (std::size_t k = 0; k < (*plot)["x"].size(); ++k) {
+      double sum = 0;
+      for (const json& series : (*plot)["series"]) sum += series["v"][k].get<double>();
+      ASSERT_NEAR(sum, 1, 6 * 5e-4) << "of six sources one that is below 0.05 % throughout is left out";
+    }
+  }
+}
+
+TEST(Report, DrawsTheRigOfACheck) {
+  const TemporaryDirectory directory;
+  const std::string rig = test::null_campaign("rig.toml"), checked = directory.path("check.json"), output = directory.path("report.html");
+  ASSERT_EQ(run_unrig(directory, {"check", "--rig", rig, test::null_campaign("wet_pluck.csv"), test::null_campaign("step_a.csv"), "-o", checked}).status, 0);
+  ASSERT_EQ(run_unrig(directory, {"report", checked, "-o", output}).status, 0);
+  const json data = page_data(output);
+  EXPECT_EQ(data["verdicts"][0]["tone"], "good");
+  const json* drawing = plot_titled(data, "The rig");
+  ASSERT_NE(drawing, nullptr);
+  EXPECT_EQ((*drawing)["marks"].size(), 2u) << "gauge and calibration";
+  const json* shapes = plot_titled(data, "Mode shapes: displacement");
+  ASSERT_NE(shapes, nullptr);
+  EXPECT_THAT((*shapes)["series"][0]["name"].get<std::string>(), HasSubstr("7.743 Hz")) << "as `unrig check` prints it in vacuum";
+
+  // A wrong run is the verdict; without its rig the page says so.
+  const std::string text = read_text(test::null_campaign("step_a.csv"));
+  const std::string bad = directory.file("step_a.csv", std::regex_replace(text, std::regex("gauge \\[N\\]"), "gauge [lbf]")), copy = directory.file("rig.toml", read_text(rig));
+  ASSERT_EQ(run_unrig(directory, {"check", "--rig", copy, test::null_campaign("wet_pluck.csv"), bad, "-o", checked}).status, 1);
+  std::filesystem::remove(copy);
+  ASSERT_EQ(run_unrig(directory, {"report", checked, "-o", output}).status, 0);
+  const json wrong = page_data(output);
+  EXPECT_EQ(wrong["verdicts"][0]["tone"], "bad");
+  EXPECT_THAT(wrong["verdicts"][0]["text"].get<std::string>(), HasSubstr("lbf"));
+  EXPECT_EQ(plot_titled(wrong, "The rig"), nullptr);
+  EXPECT_THAT(wrong.dump(), HasSubstr("is no longer there"));
 }
 
 TEST(Report, RefusesWhatIsNoResult) {

@@ -124,11 +124,14 @@ TEST(Gate, FindsAGaugeThatIsLateWithoutStoppingForIt) {
   EXPECT_FALSE(found.front().grave) << "an effect follows it";
 }
 
-TEST(Gate, ARunOfThreeSamplesSaysNothing) {
+TEST(Gate, ARunOfThreeSamplesIsNamedAndDoesNoHarm) {
   const Rig rig = read_rig(test::null_campaign("rig.toml"));
   unrig::Run run = read_run(test::null_campaign("step_a.csv"));
   for (Channel& channel : run.channels) channel.value.conservativeResize(3);
-  EXPECT_THAT(suspicions(rig, {run}), IsEmpty());
+  const std::vector<Suspicion> found = suspicions(rig, {run});
+  ASSERT_EQ(found.size(), 1u);
+  EXPECT_FALSE(found.front().grave);
+  EXPECT_THAT(found.front().text, ::testing::HasSubstr("3 samples, 0.006 s"));
 }
 
 TEST(RunEstimate, OfTheSampleWithoutEffectsIsWhatWasPutIn) {

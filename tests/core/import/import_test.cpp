@@ -14,6 +14,7 @@
 #include "core/files/error.h"
 #include "core/import/channel_list.h"
 #include "core/import/delimited.h"
+#include "core/import/import_template.h"
 #include "core/import/lvm.h"
 #include "core/run/run.h"
 #include "tests/support/temporary_directory.h"
@@ -108,6 +109,16 @@ TEST(Import, NamesWhatIsWrongInAMapping) {
   Recording uneven = recording();
   uneven.channels[1].value.pop_back();
   EXPECT_THAT(complaint([&] { import_recording(uneven, head + "[[column]]\nname = \"alpha\"\nsource = \"angle\"\n[[column]]\nname = \"gauge\"\nsource = \"bridge\"\n", "m"); }), HasSubstr("3 samples"));
+}
+
+TEST(Import, TakesTheGOfAnAccelerometerForGravity) {
+  std::string rows = "time (s);Beschl. (g)\n";
+  for (int k = 0; k < 30; ++k) rows += std::to_string(k) + ";" + std::to_string(k % 3) + "\n";
+  const Recording r = read_delimited(rows, "log.csv");
+  const std::string text = import_template(r);
+  EXPECT_THAT(text, HasSubstr("name = \"acc\""));
+  const Imported imported = import_recording(r, text, "map.toml");
+  EXPECT_DOUBLE_EQ(parse_run(imported.text, "run.csv").channel("acc").value[2], 2 * 9.80665);
 }
 
 TEST(Import, WarnsOfNamesThatNoCommandReads) {
@@ -257,6 +268,20 @@ TEST(Delimited, ReadsOtherEncodings) {
   EXPECT_EQ(in_utf8("\xFF\xFE" "a"), "") << "half a letter";
   EXPECT_EQ(in_utf8("\xE2\x82"), "\xC3\xA2\xC2\x82") << "cut within a letter: no UTF-8";
   EXPECT_EQ(in_utf8("\xE2\x82\xAC"), "\xE2\x82\xAC");
+}
+
+TEST(Delimited, FindsTheTitlesAboveATable) {
+  const std::string rows = "time (ms);force (N)\n0;1,5\n2;1,25\n4;1,0\n";
+  for (const std::string titles : {"A recording\n\n", "A recording;\nof today;\n", "one\ntwo, with a comma\nthree: 3\n"}) {
+    const Recording r = read_delimited(titles + rows, "f");
+    ASSERT_EQ(r.channels.size(), 2u) << titles;
+    EXPECT_EQ(r.channels[0].unit, "ms") << titles;
+    EXPECT_EQ(r.channels[1].value, (std::vector<double>{1.5, 1.25, 1})) << titles;
+    EXPECT_THAT(r.warnings.back(), HasSubstr("taken for titles"));
+  }
+  EXPECT_TRUE(read_delimited(rows, "f").warnings.empty());
+  EXPECT_TRUE(read_delimited("# A recording\n" + rows, "f").warnings.empty()) << "remarks are no titles";
+  EXPECT_EQ(read_delimited("A recording\nof today\n" + rows, "f", {"", "", 2, {}}).warnings.size(), 0u) << "where the mapping says so";
 }
 
 TEST(Delimited, RefusesWhatIsNoTable) {
