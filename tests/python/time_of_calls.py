@@ -14,6 +14,7 @@ import unrig
 program, campaign, times = sys.argv[1], pathlib.Path(sys.argv[2]), int(sys.argv[3]) if len(sys.argv) > 3 else 7
 rig = str(campaign / "rig.toml")
 runs = [str(campaign / name) for name in ("dry_pluck.csv", "wet_pluck.csv", "step_a.csv", "step_b.csv", "step_c.csv")]
+drag = [str(campaign.parent / "drag" / name) for name in ("rig.toml", "dry_pluck.csv", "wet_pluck.csv", "step_a.csv", "step_b.csv", "step_c.csv")]
 unrig.use_threads(1)
 
 
@@ -32,7 +33,8 @@ with tempfile.TemporaryDirectory() as folder:
     fit = f"{folder}/fit.json"
     calls = {"fit": (["--rig", rig, *runs, "-o", fit], lambda: unrig.fit(rig, runs)),
              "correct": (["--rig", rig, "--fit", fit, runs[2], "-o", f"{folder}/corrected.csv"], lambda: unrig.correct(rig, fit, runs[2])),
-             "diagnose": (["--rig", rig, *runs, "-o", f"{folder}/diagnosis.json"], lambda: unrig.diagnose(rig, runs))}
+             "diagnose": (["--rig", drag[0], *drag[1:], "-o", f"{folder}/diagnosis.json"], lambda: unrig.diagnose(drag[0], drag[1:])),
+             "trial": (["--rig", rig, "--trials", "4", "--effects", "quadratic-drag", "-o", f"{folder}/trial.json"], lambda: unrig.trial(rig, trials=4, effects=["quadratic-drag"]))}
     print("call      command [s]  Python [s]  Python over command [%]")
     for verb, (words, call) in calls.items():
         threads = [] if verb == "correct" else ["--threads", "1"]
