@@ -33,8 +33,7 @@ with tempfile.TemporaryDirectory() as folder:
     fit = f"{folder}/fit.json"
     calls = {"fit": (["--rig", rig, *runs, "-o", fit], lambda: unrig.fit(rig, runs)),
              "correct": (["--rig", rig, "--fit", fit, runs[2], "-o", f"{folder}/corrected.csv"], lambda: unrig.correct(rig, fit, runs[2])),
-             "diagnose": (["--rig", drag[0], *drag[1:], "-o", f"{folder}/diagnosis.json"], lambda: unrig.diagnose(drag[0], drag[1:])),
-             "trial": (["--rig", rig, "--trials", "4", "--effects", "quadratic-drag", "-o", f"{folder}/trial.json"], lambda: unrig.trial(rig, trials=4, effects=["quadratic-drag"]))}
+             "diagnose": (["--rig", drag[0], *drag[1:], "--effects", "quadratic-drag", "-o", f"{folder}/diagnosis.json"], lambda: unrig.diagnose(drag[0], drag[1:], effects=["quadratic-drag"]))}
     print("call      command [s]  Python [s]  Python over command [%]")
     for verb, (words, call) in calls.items():
         threads = [] if verb == "correct" else ["--threads", "1"]
