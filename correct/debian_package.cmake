@@ -3,10 +3,12 @@ set(CPACK_GENERATOR DEB)
 set(CPACK_PACKAGE_VENDOR "the unrig authors")
 set(CPACK_PACKAGE_CONTACT "the unrig authors <unrig@localhost>" CACHE STRING "who stands as the maintainer in the Debian package")
 set(CPACK_PACKAGE_DESCRIPTION_SUMMARY "take the rig out of an unsteady force measurement")
-set(CPACK_PACKAGE_DESCRIPTION "From strain-gauge recordings of an unsteady aerodynamic or hydrodynamic test to the load
-that a perfectly rigid rig would have felt: the program unrig, its C++ library and its Python package.")
+set(CPACK_PACKAGE_DESCRIPTION "From strain-gauge recordings of an unsteady aerodynamic or hydrodynamic
+test to the load that a perfectly rigid rig would have felt: the program unrig,
+its C++ library and its Python package.")
 set(CPACK_PACKAGING_INSTALL_PREFIX /usr)
 set(CPACK_STRIP_FILES ON)
+set(CPACK_PRE_BUILD_SCRIPTS ${PROJECT_SOURCE_DIR}/correct/debian_policy.cmake)
 set(CPACK_DEBIAN_FILE_NAME DEB-DEFAULT)
 set(CPACK_DEBIAN_PACKAGE_SECTION science)
 # The libraries that the program and the Python module are linked to, by dpkg-shlibdeps; of our own, where they are shared, it reads the libraries themselves.

@@ -27,6 +27,9 @@
 #include "fit/fit_command.h"
 #include "fit/propose/propose_command.h"
 #include "fit/simulate/simulate_command.h"
+#ifdef UNRIG_MPI
+#include "correct/mpi/ranks_of_mpi.h"
+#endif
 
 namespace {
 
@@ -151,6 +154,10 @@ int help(int argc, char** argv) {
 }  // namespace
 
 int main(int argc, char** argv) {
+#ifdef UNRIG_MPI
+  unrig::RanksOfMpi ranks;
+  unrig::set_hand_out([&](std::size_t count) { return ranks.share(count); });
+#endif
   if (argc < 2) {
     print_help(stderr);
     return unrig::exit_wrong_use;

@@ -3,7 +3,7 @@
 # This is the one place that names the Debian packages. With all of them present nothing touches the network.
 #
 #   sh sample_data/setup.sh               what the build needs
-#   sh sample_data/setup.sh --optional    and what only saves time (ccache, clang under the sanitizers) or serves comparisons (SciPy) and the look of the report (Chromium)
+#   sh sample_data/setup.sh --optional    and what only saves time (ccache, clang under the sanitizers), serves comparisons (SciPy), the look of the report (Chromium) or clusters (Open MPI)
 set -eu
 cd "$(dirname "$0")/.."
 
@@ -12,7 +12,8 @@ packages="cmake g++ make ninja-build pkg-config
   libmatio-dev libgtest-dev libgmock-dev libbenchmark-dev"
 optional="ccache clang libclang-rt-dev chromium python3-numpy python3-scipy python3-h5py
   pybind11-dev python3-dev python3-xarray python3-pandas python3-netcdf4 python3-matplotlib zsh fish
-  python3-jsonschema python3-nbformat python3-nbclient python3-ipykernel dpkg-dev"
+  python3-jsonschema python3-nbformat python3-nbclient python3-ipykernel dpkg-dev lintian
+  libopenmpi-dev openmpi-bin"
 
 case "${1-}" in
   "") ;;

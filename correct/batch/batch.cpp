@@ -58,7 +58,7 @@ struct Planned {
   Strings files;              ///< that it reads, as the campaign names them
   std::string key;
   std::optional<std::size_t> fit;  ///< the case that a correction rests on
-  std::size_t turn = 0;       ///< which shard takes it: turn mod shards
+  std::size_t turn = 0;       ///< who takes it: shard i + 1 of n where turn mod n = i, or a rank that it is handed out to; ascending
   bool settled = false;       ///< nothing to compute
 };
 
@@ -338,6 +338,111 @@ class Workshop {
   KeptCases kept_;
 };
 
+/// The cases that fall to this process, from the first turn to the last.
+class Shift {
+ public:
+  Shift(const BatchProblem& problem, const std::vector<Planned>& cases)
+      : problem_(problem), cases_(cases), workshop_(problem, cases), turns_(turns_of(problem, cases)), most_(problem.threads > 0 ? static_cast<std::size_t>(problem.threads) : std::max(1u, std::thread::hardware_concurrency())) {
+    for (const Planned& one : cases) expected_ += problem.hand_out || one.turn % problem.shards == problem.shard - 1 ? 1 : 0;
+  }
+
+  /// Until nothing is left. A turn is asked for when there is room for one more case.
+  void work() {
+    for (;;) {
+      const bool room = children_.running() < most_;
+      if (more_ && children_.running() + pending_.size() < most_) take_turn();
+      else if (const std::optional<std::size_t> i = room ? startable() : std::nullopt) start(*i);
+      else if (room && more_) take_turn();
+      else if (children_.running() > 0) see_to(children_.wait());
+      else return;
+      tell();
+    }
+  }
+
+  /// With their numbers, ascending; not what was only borrowed.
+  std::vector<std::pair<std::size_t, BatchCase>> outcomes() const {
+    std::vector<std::pair<std::size_t, BatchCase>> all;
+    for (const auto& [i, outcome] : wanted_)
+      if (!borrowed_.contains(i)) all.emplace_back(i, *outcome);
+    return all;
+  }
+
+ private:
+  static Pieces turns_of(const BatchProblem& problem, const std::vector<Planned>& cases) {
+    const std::size_t count = cases.empty() ? 0 : cases.back().turn + 1;
+    return problem.hand_out ? problem.hand_out(count) : pieces_of_shard(problem.shard, problem.shards, count);
+  }
+
+  void want(std::size_t i) {
+    const std::optional<BatchCase>& known = wanted_[i] = cases_[i].settled ? cases_[i].result : workshop_.find(cases_[i]);
+    if (!known) pending_.push_back(i);
+  }
+
+  void take_turn() {
+    const std::optional<std::size_t> turn = turns_.next();
+    more_ = turn.has_value();
+    if (!more_) return;
+    for (const Planned& one : std::ranges::equal_range(cases_, *turn, {}, &Planned::turn)) {
+      const auto i = static_cast<std::size_t>(&one - cases_.data());
+      want(i);
+      if (const std::optional<std::size_t> fit = one.fit; !wanted_[i] && fit && !wanted_.contains(*fit)) {
+        borrowed_.insert(*fit);
+        want(*fit);
+      }
+    }
+  }
+
+  /// The first that waits neither for its fit nor for another with the same content.
+  std::optional<std::size_t> startable() const {
+    for (const std::size_t i : pending_)
+      if (const Planned& one = cases_[i]; !(one.fit && !wanted_.at(*one.fit)) && !at_work_.contains(one.key)) return i;
+    return std::nullopt;
+  }
+
+  void start(std::size_t i) {
+    const Planned& one = cases_[i];
+    std::erase(pending_, i);
+    std::optional<BatchCase>& outcome = wanted_[i];
+    if (one.fit && wanted_.at(*one.fit)->status != CaseStatus::done) {
+      outcome = one.result;
+      outcome->status = CaseStatus::left_out;
+      outcome->messages = {"there is no fit to rest on"};
+    } else if (!(outcome = workshop_.find(one))) {  // else another process has done it meanwhile
+      const int threads = static_cast<int>(most_ / std::min(most_, children_.running() + pending_.size() + 1));
+      at_work_.insert(one.key);
+      children_.start(i, [&](std::FILE* said) { return workshop_.compute(one, threads, said); });
+    }
+  }
+
+  void see_to(const Children::Ended& ended) {
+    const Planned& one = cases_[ended.job];
+    at_work_.erase(one.key);
+    std::optional<BatchCase>& outcome = wanted_[ended.job];
+    if (ended.status == 0 && ended.signal == 0) outcome = workshop_.find(one);
+    if (outcome) return;
+    outcome = one.result;
+    outcome->status = CaseStatus::failed;
+    take_said(*outcome, ended.said);
+    if (ended.signal != 0) outcome->messages.push_back(fmt::format("ended by signal {} ({})", ended.signal, ::strsignal(ended.signal)));
+  }
+
+  void tell() const {
+    if (problem_.progress) problem_.progress(fmt::format("{} of {} cases", wanted_.size() - pending_.size() - children_.running(), expected_ + borrowed_.size()));
+  }
+
+  const BatchProblem& problem_;
+  const std::vector<Planned>& cases_;
+  const Workshop workshop_;
+  Pieces turns_;
+  std::size_t most_, expected_ = 0;
+  bool more_ = true;
+  std::map<std::size_t, std::optional<BatchCase>> wanted_;  // what fell to this process, and fits that its corrections rest on
+  std::set<std::size_t> borrowed_;                          // those fits where they fell to another
+  std::vector<std::size_t> pending_;
+  std::set<std::string> at_work_;  // keys: of two campaigns with the same content one is computed
+  Children children_;
+};
+
 }  // namespace
 
 std::string to_string(CaseStatus status) {
@@ -347,70 +452,15 @@ std::string to_string(CaseStatus status) {
 
 BatchResult run_batch(const BatchProblem& problem) {
   const Planner plan(problem.batch);
-  const Workshop workshop(problem, plan.cases);
   BatchResult result;
   result.study = plan.study();
   result.rows = plan.rows;
   result.planned = plan.cases.size();
   result.shard = problem.shard;
   result.shards = problem.shards;
-
-  std::map<std::size_t, std::optional<BatchCase>> wanted;  // this shard's, and fits that its corrections rest on
-  for (std::size_t i = 0; i < plan.cases.size(); ++i)
-    if (plan.cases[i].turn % problem.shards == problem.shard - 1) wanted[i] = plan.cases[i].settled ? plan.cases[i].result : workshop.find(plan.cases[i]);
-  std::set<std::size_t> borrowed;
-  for (const auto& [i, known] : wanted)
-    if (const std::optional<std::size_t> fit = plan.cases[i].fit; !known && fit && !wanted.contains(*fit)) borrowed.insert(*fit);
-  for (const std::size_t fit : borrowed) wanted[fit] = workshop.find(plan.cases[fit]);
-
-  std::vector<std::size_t> pending;
-  for (const auto& [i, known] : wanted)
-    if (!known) pending.push_back(i);
-  const std::size_t most = problem.threads > 0 ? static_cast<std::size_t>(problem.threads) : std::max(1u, std::thread::hardware_concurrency());
-  const auto tell = [&](std::size_t at_work) {
-    if (problem.progress) problem.progress(fmt::format("{} of {} cases", wanted.size() - pending.size() - at_work, wanted.size()));
-  };
-  Children children;
-  std::set<std::string> at_work;  // keys: of two campaigns with the same content one is computed
-  while (!pending.empty() || children.running() > 0) {
-    for (std::size_t p = 0; p < pending.size() && children.running() < most;) {
-      const std::size_t i = pending[p];
-      const Planned& one = plan.cases[i];
-      const std::optional<BatchCase>* const fit = one.fit ? &wanted.at(*one.fit) : nullptr;
-      if ((fit && !*fit) || at_work.contains(one.key)) {
-        ++p;
-        continue;
-      }
-      pending.erase(pending.begin() + static_cast<std::ptrdiff_t>(p));
-      if (fit && (*fit)->status != CaseStatus::done) {
-        wanted[i] = one.result;
-        wanted[i]->status = CaseStatus::left_out;
-        wanted[i]->messages = {"there is no fit to rest on"};
-      } else if (std::optional<BatchCase> known = workshop.find(one)) {  // another process has done it meanwhile
-        wanted[i] = std::move(known);
-      } else {
-        const int threads = static_cast<int>(std::max<std::size_t>(1, most / std::min(most, children.running() + pending.size() + 1)));
-        at_work.insert(one.key);
-        children.start(i, [&](std::FILE* said) { return workshop.compute(one, threads, said); });
-      }
-      tell(children.running());
-    }
-    if (children.running() == 0) continue;
-    const Children::Ended ended = children.wait();
-    const Planned& one = plan.cases[ended.job];
-    at_work.erase(one.key);
-    std::optional<BatchCase>& outcome = wanted[ended.job];
-    if (ended.status == 0 && ended.signal == 0) outcome = workshop.find(one);
-    if (!outcome) {
-      outcome = one.result;
-      outcome->status = CaseStatus::failed;
-      take_said(*outcome, ended.said);
-      if (ended.signal != 0) outcome->messages.push_back(fmt::format("ended by signal {} ({})", ended.signal, ::strsignal(ended.signal)));
-    }
-    tell(children.running());
-  }
-  for (auto& [i, outcome] : wanted)
-    if (!borrowed.contains(i)) result.cases.emplace_back(i, std::move(*outcome));
+  Shift shift(problem, plan.cases);
+  shift.work();
+  result.cases = shift.outcomes();
   return result;
 }
 

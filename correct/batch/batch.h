@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "correct/batch/batch_file.h"
+#include "fit/trial/shard.h"
 
 namespace unrig {
 
@@ -52,6 +53,7 @@ struct BatchProblem {
   Batch batch;
   std::string cases;                  ///< folder in which every result is kept and found again
   std::size_t shard = 1, shards = 1;  ///< which part of the cases is computed
+  HandOut hand_out;                   ///< if it is set: whose turn it says, one after the other
   int threads = 0;                    ///< 0: as many as the machine has
   std::function<void(const std::string&)> progress;
 };
@@ -59,7 +61,7 @@ struct BatchProblem {
 /// Every campaign's commands, each in a process of its own, as `unrig COMMAND` computes them (core/files/run_command.h). A case is known by its key: the program's version, the command and its options, and the
 /// contents of rig, runs and laws in their order, not their names. What was kept under it is not computed again, except after a crash.
 ///
-/// A shard takes the campaigns whose turn it is; of a campaign with more than 16 corrections every 16 have a turn of their own, and the fit that they rest on is computed there too where it is not kept.
+/// A shard takes the campaigns whose turn it is, a rank those that it is handed out; of a campaign with more than 16 corrections every 16 have a turn of their own, and the fit that they rest on is computed there too where it is not kept.
 /// Throws InputError where the folder of cases cannot be had.
 BatchResult run_batch(const BatchProblem& problem);
 

@@ -51,7 +51,7 @@ int batch_command(int argc, char** argv) {
   app.add_option("campaigns", campaigns, "which runs belong together, which rig, which commands (TOML)")->required();
   app.add_option("-o,--output", output, "table (CSV); as FILE.json what `unrig collect` puts together")->required();
   app.add_option("--report", page, "the table as a page too (HTML)");
-  app.add_option("--shard", shard, "i/n: only every n-th campaign, from the i-th on, for `unrig collect` to put together; without it as SLURM_ARRAY_TASK_ID or the rank under Open MPI say");
+  app.add_option("--shard", shard, "i/n: only every n-th campaign, from the i-th on, for `unrig collect` to put together; without it, what falls to this task of Slurm (SLURM_ARRAY_TASK_ID) or this rank of Open MPI");
   app.add_option("--cases", problem.cases, "folder in which the result of each command is kept: a second call computes only what is missing; without it CAMPAIGNS.cases beside the output");
   app.add_option("--threads", problem.threads, "how many cases at a time; without it, as many as the machine has processors")->check(CLI::Range(1, 256));
   app.footer(example);
@@ -62,6 +62,7 @@ int batch_command(int argc, char** argv) {
   }
   check_outputs({{"-o", output}, {"--report", page}}, {campaigns});
   std::tie(problem.shard, problem.shards) = shard_of(shard);
+  problem.hand_out = hand_out_of(shard);
   if (problem.shards > 1 && !output.ends_with(".json"))
     throw InputError({output, 0}, fmt::format("shard {}/{} is a part of the table", problem.shard, problem.shards), "wanted -o FILE.json for a part", "`unrig collect` makes the table of all parts.");
   problem.batch = read_batch(campaigns);

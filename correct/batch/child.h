@@ -11,7 +11,7 @@ namespace unrig {
 
 /// Pieces of work in processes of their own, so that one which crashes or takes all memory stops no other. They end with this process, however that ends.
 ///
-/// A child begins as a copy of the whole process: start none while other threads are at work.
+/// A child begins as a copy of the whole process: start none while other threads hold a lock that a child needs (those of memory and files are free in it).
 class Children {
  public:
   struct Ended {

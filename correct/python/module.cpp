@@ -6,11 +6,14 @@
 
 #include <algorithm>
 #include <array>
+#include <atomic>
 #include <chrono>
 #include <cmath>
+#include <condition_variable>
 #include <future>
 #include <map>
 #include <memory>
+#include <mutex>
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <thread>
@@ -50,79 +53,117 @@ namespace {
 using Eigen::Index;
 using Eigen::VectorXd;
 
-/// Tells Python what is being done, and lets an interrupt of the user's end the search.
-std::function<void(const std::string&)> told(const py::object& progress) {
-  const std::shared_ptr<const py::object> callable(new py::object(progress), [](const py::object* object) {
-    const py::gil_scoped_acquire lock;  // the last copy may go in any thread
-    delete object;
-  });
-  return [callable](const std::string& what) {
-    const py::gil_scoped_acquire lock;
-    if (PyErr_CheckSignals() != 0) throw py::error_already_set();
-    if (!callable->is_none()) (*callable)(what);
-  };
-}
-
 /// What the program says on standard error becomes a Python warning each.
 void warn_in_python(const std::vector<std::string>& lines) {
   for (const std::string& line : lines)
     if (PyErr_WarnEx(PyExc_UserWarning, line.c_str(), 2) != 0) throw py::error_already_set();
 }
 
-/// `work` with what it says as Python warnings, also where it throws. Called with Python's lock, and works without it.
-template <class Work>
-auto with_warnings(const Work& work) {
-  HeardWarnings said;
-  std::optional<decltype(work())> result;
-  std::exception_ptr error;
-  {
-    const py::gil_scoped_release unlocked;
-    try {
-      result = work();
-    } catch (...) {
-      error = std::current_exception();
-    }
+/// How many threads are at work. Python ends only after them: what they use is gone then.
+class AtWork {
+ public:
+  void begins() { change(+1); }
+  void ends() { change(-1); }
+  bool none_after(std::chrono::milliseconds wait) {
+    std::unique_lock lock(mutex_);
+    return changed_.wait_for(lock, wait, [&] { return threads_ == 0; });
   }
-  warn_in_python(said.lines());
-  if (error) std::rethrow_exception(error);
-  return std::move(*result);
+
+ private:
+  void change(int by) {
+    const std::lock_guard lock(mutex_);
+    threads_ += by;
+    changed_.notify_all();
+  }
+  std::mutex mutex_;
+  std::condition_variable changed_;
+  int threads_ = 0;
+};
+
+AtWork& at_work() {
+  static AtWork* const one = new AtWork;  // outlives every thread
+  return *one;
 }
 
-/// What has no search that could be asked to stop, in a thread of its own: this one looks for an interrupt of the user's ten times a second and tells of the time that has gone.
-/// After an interrupt the thread goes on to its end with what it holds, and nobody hears of it.
+constexpr std::chrono::milliseconds moment{100};
+
+/// A second interrupt ends Python all the same.
+void wait_for_threads() {
+  const py::gil_scoped_release unlocked;
+  while (!at_work().none_after(moment)) {
+    const py::gil_scoped_acquire lock;
+    if (PyErr_CheckSignals() != 0) throw py::error_already_set();
+  }
+}
+
+using Say = std::function<void(const std::string&)>;
+
+/// Ends a search for which nobody waits any more. No std::exception, which a search could take for a failure of its own.
+struct NobodyWaits {};
+
+/// `work(say)` in a thread of its own, without Python's lock. This thread looks for an interrupt of the user's ten times a second, tells `progress` what the work says, and gives its warnings to Python,
+/// also where it throws. With `what` it tells that first, and every second of the time that has gone: for work that says nothing.
+/// After an interrupt the work ends when it next says something, or at its end, and nobody hears of it. What it uses must be its own.
 template <class Work>
-auto in_a_thread(Work work, const std::string& what, const py::object& progress) {
-  using Result = decltype(work());
-  struct Outcome {
+auto in_a_thread(Work work, const py::object& progress, const std::string& what = "") {
+  using Result = decltype(work(Say()));
+  struct Talk {
     std::optional<Result> result;
-    std::vector<std::string> said;
+    std::vector<std::string> warnings;
     std::exception_ptr error;
+    std::mutex mutex;
+    std::vector<std::string> said;
+    std::atomic<bool> nobody_waits = false;
   };
-  const auto outcome = std::make_shared<Outcome>();
-  std::packaged_task<void()> task([outcome, work = std::move(work)] {
-    const HeardWarnings said;
+  const auto talk = std::make_shared<Talk>();
+  std::packaged_task<void()> task([talk, work = std::move(work)]() mutable {
+    const HeardWarnings heard;
     try {
-      outcome->result = work();
+      talk->result = work([&](const std::string& doing) {
+        if (talk->nobody_waits) throw NobodyWaits();
+        const std::lock_guard guard(talk->mutex);
+        talk->said.push_back(doing);
+      });
     } catch (...) {
-      outcome->error = std::current_exception();
+      talk->error = std::current_exception();
     }
-    outcome->said = said.lines();
+    talk->warnings = heard.lines();
   });
   std::future<void> done = task.get_future();
-  const auto doing = told(progress);
-  doing(what);
-  {
+  const auto tell = [&](const std::string& doing) {
+    if (!progress.is_none()) progress(doing);
+  };
+  const auto pass_on = [&] {
+    std::vector<std::string> said;
+    {
+      const std::lock_guard guard(talk->mutex);
+      said.swap(talk->said);
+    }
+    for (const std::string& doing : said) tell(doing);
+  };
+  if (!what.empty()) tell(what);
+  try {
     const py::gil_scoped_release unlocked;
-    std::thread(std::move(task)).detach();
-    for (int tenths = 1; done.wait_for(std::chrono::milliseconds(100)) != std::future_status::ready; ++tenths) {
+    at_work().begins();
+    std::thread([](std::packaged_task<void()> own) {
+      own();
+      own = {};
+      at_work().ends();
+    }, std::move(task)).detach();
+    for (int moments = 1; done.wait_for(moment) != std::future_status::ready; ++moments) {
       const py::gil_scoped_acquire lock;
       if (PyErr_CheckSignals() != 0) throw py::error_already_set();
-      if (tenths % 10 == 0) doing(what + " (" + std::to_string(tenths / 10) + " s gone)");
+      pass_on();
+      if (!what.empty() && moments % 10 == 0) tell(what + " (" + std::to_string(moments / 10) + " s gone)");
     }
+  } catch (...) {
+    talk->nobody_waits = true;
+    throw;
   }
-  warn_in_python(outcome->said);
-  if (outcome->error) std::rethrow_exception(outcome->error);
-  return std::move(*outcome->result);
+  pass_on();
+  warn_in_python(talk->warnings);
+  if (talk->error) std::rethrow_exception(talk->error);
+  return std::move(*talk->result);
 }
 
 /// Times of a record that is sampled evenly.
@@ -180,17 +221,19 @@ FitWithLaws fit_of(const Rig& rig, const std::vector<Run>& runs, const std::vect
   problem.effects.insert(problem.effects.end(), ids.begin(), ids.end());
   problem.start = start;
   problem.profile = profile;
-  problem.progress = told(progress);
-  return with_warnings([&] {
-    check_recorded_once(problem.runs, problem.rig);
-    pass_the_gate(problem.rig, problem.runs, anyway);
-    FitWithLaws result{fit(problem), problem.rig.laws, {}};
-    const std::vector<Suspicion> suspect = implausible_parameters(result);
-    tell(suspect);
-    if (!anyway)
-      for (const Suspicion& s : suspect) result.implausible.push_back(s.text);
-    return result;
-  });
+  return in_a_thread(
+      [problem, anyway](const Say& say) mutable {
+        problem.progress = say;
+        check_recorded_once(problem.runs, problem.rig);
+        pass_the_gate(problem.rig, problem.runs, anyway);
+        FitWithLaws result{fit(problem), problem.rig.laws, {}};
+        const std::vector<Suspicion> suspect = implausible_parameters(result);
+        tell(suspect);
+        if (!anyway)
+          for (const Suspicion& s : suspect) result.implausible.push_back(s.text);
+        return result;
+      },
+      progress);
 }
 
 py::dict load_of(const CorrectedLoad& load) {
@@ -203,20 +246,20 @@ py::dict correction(const Rig& rig, const std::string& fit_json, const std::stri
   const CorrectProblem problem{rig, read_fit(nlohmann::json::parse(fit_json), fit_name), run, calibration, {monotone, at_step}};
   if (rig.is_modal()) {
     std::optional<ModalLoad> result = in_a_thread(
-        [problem, anyway] {
+        [problem, anyway](const Say&) {
           pass_the_gate(problem, anyway);
           return modal_load(problem);
         },
-        "taking the rig out of " + run.file, progress);
+        progress, "taking the rig out of " + run.file);
     return py::dict("modal"_a = true, "unit"_a = result->unit, "start"_a = result->start, "dt"_a = result->dt, "gauge"_a = result->gauge, "load"_a = result->load, "std"_a = result->std,
                     "by_source"_a = result->by_source, "warnings"_a = result->warnings, "no_answer"_a = "", "report"_a = report(*result), "noise"_a = result->noise);
   }
   std::optional<CorrectResult> result = in_a_thread(
-      [problem, anyway] {
+      [problem, anyway](const Say&) {
         pass_the_gate(problem, anyway);
         return correct(problem);
       },
-      "taking the rig out of " + run.file, progress);
+      progress, "taking the rig out of " + run.file);
   const IndicialResponse& i = result->indicial;
   return py::dict("modal"_a = false, "unit"_a = "N", "start"_a = result->start, "dt"_a = result->dt, "onset"_a = result->onset, "semichords_per_second"_a = result->semichords_per_second,
                   "force_per_coefficient"_a = result->force_per_coefficient, "gauge"_a = result->gauge, "unexplained"_a = result->unexplained, "normal_force"_a = load_of(result->normal_force),
@@ -281,41 +324,54 @@ PYBIND11_MODULE(_unrig, m) {
   m.def("apparent_mass", [](const Rig& rig, const Run& dry, const Run& wet, const py::object& progress) {
     ApparentMassProblem problem;
     problem.rig = rig, problem.dry = dry, problem.wet = wet;
-    problem.progress = told(progress);
-    const py::gil_scoped_release unlocked;
-    const ApparentMassResult result = apparent_mass(problem);
-    return std::pair{to_json(result), report(result)};
+    return in_a_thread(
+        [problem](const Say& say) mutable {
+          problem.progress = say;
+          const ApparentMassResult result = apparent_mass(problem);
+          return std::pair{to_json(result), report(result)};
+        },
+        progress);
   });
   m.def("diagnose", [](const Rig& rig, const std::vector<Run>& runs, const std::vector<Run>& heldout, const std::vector<std::string>& effects, bool anyway, const py::object& progress) {
     DiagnoseProblem problem;
     problem.rig = rig, problem.runs = runs, problem.heldout = heldout;
     problem.effects = effects_of_option("effects", effects);
-    problem.progress = told(progress);
-    return with_warnings([&] {
-      std::vector<Run> all = problem.runs;
-      all.insert(all.end(), problem.heldout.begin(), problem.heldout.end());
-      check_recorded_once(all, problem.rig);
-      refuse_idle("effects", problem.effects, problem.rig, problem.runs);
-      pass_the_gate(problem.rig, all, anyway);
-      const Diagnosis result = diagnose(problem);
-      return std::pair{to_json(result), report(result)};
-    });
+    return in_a_thread(
+        [problem, anyway](const Say& say) mutable {
+          problem.progress = say;
+          std::vector<Run> all = problem.runs;
+          all.insert(all.end(), problem.heldout.begin(), problem.heldout.end());
+          check_recorded_once(all, problem.rig);
+          refuse_idle("effects", problem.effects, problem.rig, problem.runs);
+          pass_the_gate(problem.rig, all, anyway);
+          const Diagnosis result = diagnose(problem);
+          return std::pair{to_json(result), report(result)};
+        },
+        progress);
   });
   m.def("trial", [](const Rig& rig, const std::vector<Run>& recordings, const std::vector<std::string>& effects, int trials, unsigned seed, bool pairs, std::optional<double> noise, const py::object& progress) {
     TrialProblem problem;
     problem.rig = rig, problem.recordings = recordings, problem.trials = trials, problem.seed = seed, problem.pairs = pairs, problem.noise = noise;
     problem.effects = effects_of_option("effects", effects);
-    problem.progress = told(progress);
-    const py::gil_scoped_release unlocked;
-    const TrialResult result = run_trials(problem);
-    return std::pair{to_json(result, {}, false), report(result)};
+    problem.rig.givens = nullptr;  // as the command
+    for (Run& run : problem.recordings) run.givens = nullptr;
+    return in_a_thread(
+        [problem](const Say& say) mutable {
+          problem.progress = say;
+          check_recorded_once(problem.recordings, problem.rig);
+          const TrialResult result = run_trials(problem);
+          return std::pair{to_json(result, {}, false), report(result)};
+        },
+        progress);
   });
   m.def("check", [](const Rig& rig, const std::vector<Run>& runs) {
-    return with_warnings([&] {
-      const Checked checked = check(rig, runs);
-      tell(checked.suspicions);
-      return std::pair{to_json(checked), report(checked)};
-    });
+    return in_a_thread(
+        [rig, runs](const Say&) {
+          const Checked checked = check(rig, runs);
+          tell(checked.suspicions);
+          return std::pair{to_json(checked), report(checked)};
+        },
+        py::none());
   });
   m.def("simulate", [](const Rig& rig, const Run& run, const std::string& fit_json, const std::string& fit_name, const std::vector<std::string>& settings, const std::string& release_load, bool jumps, bool as_recorded, const py::object& progress) {
     SimulateOptions options;
@@ -324,14 +380,15 @@ PYBIND11_MODULE(_unrig, m) {
     std::optional<FittedRig> fit;
     if (!fit_json.empty()) fit = read_fit(nlohmann::json::parse(fit_json), fit_name);
     return in_a_thread(
-        [rig, run, fit, options] {
+        [rig, run, fit, options](const Say&) {
           for (const std::vector<std::string>* known : {&rig.warnings, &run.warnings})
             for (const std::string& warning : *known) warn(warning);
           const SimulateResult result = simulate(simulate_problem(rig, run, fit, options, {}).problem);
           for (const std::string& warning : result.warnings) warn(warning);
           return result.run;
         },
-        "simulating " + run.file, progress);
+        progress, "simulating " + run.file);
   });
+  py::module_::import("atexit").attr("register")(py::cpp_function(wait_for_threads));
   m.def("use_threads", &use_threads, "threads"_a, "How many threads the library may work in.");
 }

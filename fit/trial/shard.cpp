@@ -1,8 +1,9 @@
 #include "fit/trial/shard.h"
 
+#include <atomic>
 #include <charconv>
 #include <cstdlib>
-#include <optional>
+#include <memory>
 #include <string_view>
 
 #include "core/files/error.h"
@@ -25,6 +26,11 @@ std::optional<std::size_t> environment(const char* name) {
   return value;
 }
 
+HandOut& among_ranks() {
+  static HandOut hand_out;
+  return hand_out;
+}
+
 }  // namespace
 
 std::pair<std::size_t, std::size_t> shard_of(const std::string& option) {
@@ -43,6 +49,22 @@ std::pair<std::size_t, std::size_t> shard_of(const std::string& option) {
   }
   if (const auto rank = environment("OMPI_COMM_WORLD_RANK")) return {*rank + 1, environment("OMPI_COMM_WORLD_SIZE").value_or(1)};
   return {1, 1};
+}
+
+Pieces pieces_of_shard(std::size_t i, std::size_t n, std::size_t count) {
+  const auto asked = std::make_shared<std::atomic<std::size_t>>(0);
+  const std::size_t most = i > count ? 0 : (count - i) / n + 1;
+  return {most, [=]() -> std::optional<std::size_t> {
+            const std::size_t k = (*asked)++;
+            return k < most ? std::optional(i - 1 + k * n) : std::nullopt;
+          }};
+}
+
+void set_hand_out(const HandOut& ranks) { among_ranks() = ranks; }
+
+HandOut hand_out_of(const std::string& option) {
+  const bool by_rank = option.empty() && !environment("SLURM_ARRAY_TASK_ID") && environment("OMPI_COMM_WORLD_RANK") && environment("PMIX_RANK");
+  return by_rank && shard_of(option).second > 1 ? among_ranks() : HandOut();
 }
 
 }  // namespace unrig

@@ -159,22 +159,23 @@ TrialResult run_trials(const TrialProblem& problem) {
     result.recording_fingerprints.push_back(fingerprint(run, problem.rig));
   }
   result.study = study_of(problem, ids);
-  for (auto i = problem.shard - 1; i < static_cast<std::size_t>(problem.trials); i += problem.shards) result.outcomes.emplace_back().trial = i;
   const TrialCases cases(problem.cases, result.study);
+  const auto trials = static_cast<std::size_t>(problem.trials);
+  const Pieces pieces = problem.hand_out ? problem.hand_out(trials) : pieces_of_shard(problem.shard, problem.shards, trials);
   std::mutex mutex;
-  int done = 0;
-  in_parallel(result.outcomes.size(), [&](std::size_t i) {
-    TrialOutcome& outcome = result.outcomes[i];
-    if (std::optional<TrialOutcome> known = cases.find(outcome.trial)) {
-      outcome = std::move(*known);
-    } else {
-      outcome = run_trial(problem, ids, outcome.trial);
-      cases.keep(outcome);
+  in_parallel(pieces.most, [&](std::size_t) {
+    const std::optional<std::size_t> trial = pieces.next();
+    if (!trial) return;
+    std::optional<TrialOutcome> outcome = cases.find(*trial);
+    if (!outcome) {
+      outcome = run_trial(problem, ids, *trial);
+      cases.keep(*outcome);
     }
     const std::lock_guard guard(mutex);
-    ++done;
-    if (problem.progress) problem.progress(fmt::format("{} of {} trials (seed {})", done, result.outcomes.size(), problem.seed));
+    result.outcomes.push_back(std::move(*outcome));
+    if (problem.progress) problem.progress(fmt::format("{} of {} trials (seed {})", result.outcomes.size(), pieces.most, problem.seed));
   });
+  std::sort(result.outcomes.begin(), result.outcomes.end(), [](const TrialOutcome& a, const TrialOutcome& b) { return a.trial < b.trial; });
   tally(result);
   return result;
 }

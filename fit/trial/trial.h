@@ -8,6 +8,7 @@
 #include "core/files/provenance.h"
 #include "core/rig/rig.h"
 #include "core/run/run.h"
+#include "fit/trial/shard.h"
 
 namespace unrig {
 
@@ -23,6 +24,7 @@ struct TrialProblem {
   std::vector<Run> recordings;       ///< whose conditions, motion, sampling and noise the simulated runs repeat; none: runs are drawn
   std::optional<double> noise;       ///< of the gauge [N]; without it that of the recordings, or 0.03
   std::size_t shard = 1, shards = 1; ///< only the trials i with i mod shards = shard - 1
+  HandOut hand_out;                  ///< if it is set: which trials it says, one after the other
   std::string cases;                 ///< folder in which every trial's outcome is kept and found again; empty: none
   std::function<void(const std::string&)> progress;  ///< called from one thread at a time
 };

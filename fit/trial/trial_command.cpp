@@ -33,7 +33,7 @@ int trial_command(int argc, char** argv) {
   app.add_option("--noise", noise, "standard deviation of the gauge's noise; without it that of the recordings, or 0.03 N");
   app.add_flag("--outside", problem.outside, "keep what is hidden from the candidates: the right verdict is `unexplained`");
   app.add_flag("--nulls", problem.nulls, "hide nothing in any campaign: every name is a false alarm")->excludes(pairs)->excludes("--outside");
-  app.add_option("--shard", shard, "i/n: only every n-th campaign, from the i-th on, for `unrig collect` to put together; without it as SLURM_ARRAY_TASK_ID or the rank under Open MPI say");
+  app.add_option("--shard", shard, "i/n: only every n-th campaign, from the i-th on, for `unrig collect` to put together; without it, what falls to this task of Slurm (SLURM_ARRAY_TASK_ID) or this rank of Open MPI");
   app.add_option("--cases", problem.cases, "folder in which the outcome of each campaign is kept: a second call computes only what is missing");
   app.add_option_function<int>("--threads", use_threads, "how many threads to work in; without it, as many as the machine has")->check(CLI::Range(1, 256));
   app.add_option("-o,--output", output, "result (JSON)")->required();
@@ -48,6 +48,7 @@ int trial_command(int argc, char** argv) {
   check_outputs({{"-o", output}}, inputs);
   check_given_once(recordings);
   std::tie(problem.shard, problem.shards) = shard_of(shard);
+  problem.hand_out = hand_out_of(shard);
   problem.rig = read_rig(rig);
   problem.rig.givens = nullptr;  // its simulated rigs have just these numbers
   for (const std::string& warning : problem.rig.warnings) warn(warning);

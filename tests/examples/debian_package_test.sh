@@ -21,7 +21,7 @@ for needed in libc6 libstdc++6 libfftw3-double3 libudunits2-0 libfmt9 libhdf5-10
   dpkg-deb --field "$package" Depends | grep -q "$needed" || fails "the package does not depend on $needed"
 done
 usr=$folder/root/usr
-for file in bin/unrig share/man/man1/unrig.1 share/doc/unrig/manual/README.md share/doc/unrig/schemas/fit.schema.json share/doc/unrig/copyright share/doc/unrig/null/rig.toml \
+for file in bin/unrig share/man/man1/unrig.1.gz share/doc/unrig/manual/README.md share/doc/unrig/schemas/fit.schema.json share/doc/unrig/copyright share/doc/unrig/changelog.gz share/doc/unrig/null/rig.toml \
   share/bash-completion/completions/unrig share/zsh/site-functions/_unrig share/fish/vendor_completions.d/unrig.fish include/unrig/fit/fit.h; do
   test -s "$usr/$file" || fails "the package lacks usr/$file"
 done
@@ -31,12 +31,20 @@ library=$(find "$usr" -name 'libunrig_core.*' | head -n 1)
 test -n "$library" || fails "the package lacks the library"
 if grep -rlF "$source" "$folder/root" | grep .; then fails "these name the folder that they were built in"; fi
 
+# What Debian's own check finds. The maintainer's address is for whoever hands the package out to give (CPACK_PACKAGE_CONTACT); libraries for one architecture at a time may lie in usr/lib.
+if command -v lintian >/dev/null; then
+  lintian --allow-root --suppress-tags bogus-mail-host,bogus-mail-host-in-debian-changelog,pkg-config-unavailable-for-cross-compilation --fail-on error,warning "$package" || fails "lintian finds these"
+else
+  echo "not tried: lintian, which is not there"
+fi
+
 # As a user runs it, from the package's files alone.
 "$usr/bin/unrig" check --rig "$usr/share/doc/unrig/null/rig.toml" "$usr/share/doc/unrig/null/dry_pluck.csv" >"$folder/checked"
 grep -q "what these runs can determine" "$folder/checked"
 if find "$build/correct/python/unrig" -name '_unrig*.so' 2>/dev/null | grep -q .; then
   python=$(find "$usr/lib/python3/dist-packages/unrig" -name '_unrig*.so')
   test -n "$python" || fails "the Python module is not where Debian's Python looks"
+  if nm -D --defined-only "$python" | grep -v ' PyInit__unrig$' | grep .; then fails "the Python module shows these"; fi
   PYTHONPATH=$usr/lib/python3/dist-packages /usr/bin/python3 -c "import unrig; print('Python package', unrig.__version__, 'with', unrig.read_rig('$usr/share/doc/unrig/null/rig.toml'))"
 fi
 [ -n "$chroot" ] || exit 0

@@ -1,7 +1,7 @@
 #!/bin/sh
 # sh shards.sh UNRIG SOURCES [TRIALS KILLS [SHARDS...]]: nulls of one pluck in one call, and through 1, 2, 7 and 64 shards of which processes are killed at random times
-# and started again, KILLS times for each number of shards. Ends with 1 where the results are not the same bytes. Then what shards and kept cases cost on cases of a second or more.
-# Without TRIALS the short form: 28 nulls, three kills, 1, 2 and 7 shards, and no costs.
+# and started again, KILLS times for each number of shards. Ends with 1 where the results are not the same bytes.
+# Without TRIALS the short form: 28 nulls, three kills, 1, 2 and 7 shards.
 set -eu
 unrig=$(realpath "$1") sources=$(realpath "$2")
 trials=${3:-28} kills=${4:-3} numbers="1 2 7"
@@ -47,22 +47,3 @@ for shards in $numbers; do
   cmp all.json "of_$shards/all.json"
   echo "$shards shards, $killed processes killed in $tries tries: the same bytes, $(sha256sum < all.json | cut -c 1-16), $(calculate "$(now) - $begun" 1) s"
 done
-[ "$trials" -ge 1000 ] || exit 0
-
-# Costs, in seconds of the processor: other work on the machine must not count.
-used() {
-  times > times.txt
-  awk 'NR == 2 { for (i = 1; i <= 2; ++i) { split($i, a, "m"); t += 60 * a[1] + a[2] } printf "%.2f", t }' times.txt
-}
-slow() { "$unrig" trial --rig "$null/rig.toml" --trials 14 --seed 30 --threads 1 --quiet "$@"; }
-used > before.txt; slow -o slow.json; used > after.txt; alone=$(calculate "$(cat after.txt) - $(cat before.txt)" 2)
-used > before.txt
-for i in 1 2 3 4 5 6 7; do slow --cases slow --shard $i/7 -o slow$i.json; done
-"$unrig" collect slow?.json -o slow_all.json > /dev/null
-used > after.txt
-cut=$(calculate "$(cat after.txt) - $(cat before.txt)" 2)
-used > before.txt
-for i in 1 2 3 4 5 6 7; do slow --cases slow --shard $i/7 -o slow$i.json; done
-used > after.txt
-found=$(calculate "$(cat after.txt) - $(cat before.txt)" 2)
-echo "14 campaigns of five runs, $(calculate "$alone / 14" 2) s each: $alone s in one call, $cut s through seven shards ($(calculate "100 * ($cut / $alone - 1)" 1) %); all of them found again: $found s ($(calculate "100 * $found / $alone" 2) %)"

@@ -53,6 +53,17 @@ def run_from_dataframe(frame, *, kind: str, density: float, speed: float = 0.0, 
     return run_from_arrays(factor * np.asarray(time, dtype=float), columns, kind=kind, density=density, speed=speed, medium=medium, name=name)
 
 
+def dataset_of_run(run: Run):
+    """A recording, or what `simulate` found, as an xarray.Dataset over `time` [s], in SI; `.to_netcdf(path)` of it writes a file."""
+    import xarray
+    attributes = {"kind": run.kind, "medium": run.medium, "density": run.density, "speed": run.speed, "run": run.file, "run_fingerprint": run.fingerprint, "unrig_version": _unrig.__version__}
+    columns = {column: ("time", run[column], {"units": run.unit(column)}) for column in run.columns}
+    return xarray.Dataset(columns, {"time": ("time", run.time, {"units": "s"})}, attributes)
+
+
+Run.to_dataset = dataset_of_run
+
+
 def as_rig(rig: Union[Path, Rig]) -> Rig:
     return rig if isinstance(rig, Rig) else read_rig(rig)
 

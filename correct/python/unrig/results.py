@@ -49,6 +49,47 @@ def number(x: Any) -> float:
     return math.nan if x is None else float(x)
 
 
+def dataset_of(data: dict[str, Any], text: str):
+    import xarray
+    variables: dict[str, Any] = {"json": ((), as_column([text]).reshape(()))}  # an attribute of HDF5 ends at 64 kB
+    attributes: dict[str, Any] = {}
+    for name, value in flat(data).items():
+        if isinstance(value, str):
+            attributes[name] = value
+        elif not isinstance(value, list):
+            variables[name] = ((), as_column([value]).reshape(()))
+        elif value and all(isinstance(row, dict) for row in value):
+            variables |= columns_of(name, value)
+        elif value and not any(isinstance(cell, (list, dict)) for cell in value):
+            variables[name] = (name, as_column(value))
+    return xarray.Dataset(variables, attrs=attributes)
+
+
+def columns_of(name: str, objects: list[dict[str, Any]]) -> dict[str, Any]:
+    """What each of them has of numbers and words, along `name`."""
+    rows = [flat(row) for row in objects]
+    columns = {column: [row.get(column) for row in rows] for column in dict.fromkeys(key for row in rows for key in row)}
+    return {f"{name}.{column}": (name, as_column(cells)) for column, cells in columns.items() if not any(isinstance(cell, list) for cell in cells)}
+
+
+def flat(data: dict[str, Any]) -> dict[str, Any]:
+    """With the members of objects beside their own: {"rate": {"value": 2}} as {"rate.value": 2}."""
+    members: dict[str, Any] = {}
+    for key, value in data.items():
+        members |= {f"{key}.{inner}": cell for inner, cell in flat(value).items()} if isinstance(value, dict) else {key: value}
+    return members
+
+
+def as_column(cells: list[Any]):
+    """Numbers (nan where there is none, 0 and 1 for truth values), or words (empty where there is none)."""
+    import numpy
+    if any(isinstance(cell, str) for cell in cells):
+        return numpy.array(["" if cell is None else str(cell) for cell in cells], dtype=object)
+    if all(isinstance(cell, int) for cell in cells):
+        return numpy.array(cells, dtype=numpy.int64)
+    return numpy.array([number(cell) for cell in cells])
+
+
 class Result:
     """What a command found. `json` is what the program writes to its file, byte by byte; `data` the same as dictionaries."""
 
@@ -69,6 +110,17 @@ class Result:
     @property
     def warnings(self) -> list[str]:
         return self.data.get("warnings", [])
+
+    def to_dataset(self):
+        """The result as an xarray.Dataset: its lists of objects as dimensions, their numbers and words as columns, single numbers as variables without dimension.
+
+        Names follow `data`: `fit.runs.noise` over `fit.runs` is data["fit"]["runs"][...]["noise"]. What fits no table is in the variable `json` alone, which is the whole result as text.
+        """
+        return dataset_of(self.data, self.json)
+
+    def to_netcdf(self, path) -> None:
+        """Writes `to_dataset()` as a NetCDF file (with python3-netcdf4 of version 4, which is HDF5)."""
+        self.to_dataset().to_netcdf(path)
 
     def __repr__(self) -> str:
         return self.report()
@@ -132,11 +184,8 @@ class FitResult(Result):
         along["identified"] = ("parameter", [int(p.identified) for p in parameters])
         along["covariance"] = (("parameter", "parameter_2"), self.covar)
         names = list(self.params)
+        along["json"] = ((), as_column([self.json]).reshape(()))
         return xarray.Dataset(along, {"parameter": names, "parameter_2": names}, {"reduced_chi2": self.redchi, "bic": self.bic, "no_answer": self.no_answer})
-
-    def to_netcdf(self, path) -> None:
-        """Writes `to_dataset()` as a NetCDF file."""
-        self.to_dataset().to_netcdf(path)
 
     def plot(self, ax=None):
         """Residual over noise of each run's channels; needs matplotlib. Returns the axes."""
