@@ -382,8 +382,9 @@ class Shift {
     const std::optional<std::size_t> turn = turns_.next();
     more_ = turn.has_value();
     if (!more_) return;
-    for (const Planned& one : std::ranges::equal_range(cases_, *turn, {}, &Planned::turn)) {
-      const auto i = static_cast<std::size_t>(&one - cases_.data());
+    const auto first = std::ranges::lower_bound(cases_, *turn, {}, &Planned::turn);
+    for (auto i = static_cast<std::size_t>(first - cases_.begin()); i < cases_.size() && cases_[i].turn == *turn; ++i) {
+      const Planned& one = cases_[i];
       want(i);
       if (const std::optional<std::size_t> fit = one.fit; !wanted_[i] && fit && !wanted_.contains(*fit)) {
         borrowed_.insert(*fit);
