@@ -358,8 +358,8 @@ struct Laws {
 
 bool leaves_something(const Trial& t) { return what_remains(t).found; }
 
-/// The law of what no effect explains: beside nothing, since an effect of the list may stand in for it, and beside the best set. Where the best of both is named and has the best evidence of all sets that were
-/// tried, decisively better than what was `found`, it is in `found`.
+/// The law of what no effect explains: beside nothing, since an effect of the list may stand in for it, and beside the best set. A law that is on the list goes by its id: an effect of the list comes first where
+/// no form is decisively better. Where the best of both is named, no set that was tried is decisively better, and it is decisively better than what was `found`, it is in `found`.
 std::optional<Laws> look_for_laws(const DiagnoseProblem& problem, FitProblem& fit_problem, const Setting& files, const Trial& baseline, Selection& selection, Explanation& found) {
   Laws laws;
   const auto look_beside = [&](const Trial& base) {
@@ -375,9 +375,11 @@ std::optional<Laws> look_for_laws(const DiagnoseProblem& problem, FitProblem& fi
   std::stable_sort(laws.tried.begin(), laws.tried.end(), [](const Trial& a, const Trial& b) { return bic_difference(a, b) < 0; });
   fit_problem.rig.laws.clear();
   if (laws.tried.empty()) return std::nullopt;
+  const auto listed = std::find_if(laws.tried.begin(), laws.tried.end(), [](const Trial& t) { return !is_law_id(t.effects.back()); });
+  if (listed != laws.tried.end() && bic_difference(*listed, laws.tried.front()) < decisive) std::rotate(laws.tried.begin(), listed, listed + 1);
   fit_problem.rig.laws = laws.tried.front().arrival.joint.model().rig().laws;
   Explanation with = look_at(problem, files, baseline, files, laws.tried.front(), 0);
-  const bool best_of_all = bic_difference(with.best, baseline) <= selection.ranking().front().delta_bic;
+  const bool best_of_all = bic_difference(with.best, baseline) < selection.ranking().front().delta_bic + decisive;
   if (naming_of(with.best, baseline, with.clean(), with.predicts) != Naming::named || !best_of_all || !(bic_difference(with.best, found.best) < -decisive)) {
     fit_problem.rig.laws.clear();
     return std::nullopt;
