@@ -318,14 +318,14 @@ RunEstimate estimate(const CheckModel& check, const Run& run, double reference) 
 
 Waveform waveform(const CheckModel& check, const Run& whole, const RunEstimate& estimated, double stiffness, double apparent) {
   Waveform found;
-  if (!estimated.moves || estimated.stalled || !std::isfinite(estimated.steady) || estimated.reversed) return found;
+  if (!estimated.moves || !std::isfinite(estimated.steady) || estimated.reversed) return found;
   const double rest = 1 / estimated.modelled;
   StepMotion motion = step_motion(whole, rest);
   const Run run = shortened(whole, motion.begin);
   if (run.samples() < whole.samples()) motion = step_motion(run, rest);
   if (!motion.found) return found;
   constexpr double least_slope = 0.2, most_slope = 1.5, periods = 4, latest = 0.03;
-  const VectorXd expected = simulated(check, run, motion, std::exp(stiffness), std::clamp(std::exp(estimated.steady), least_slope, most_slope), std::exp(apparent));
+  const VectorXd expected = simulated(check, run, motion, std::exp(stiffness), std::clamp((estimated.stalled ? stalled_slope : 1.0) * std::exp(estimated.steady), least_slope, most_slope), std::exp(apparent));
   if (!expected.allFinite()) return found;
   const VectorXd gauge = without_gaps(run.channel("gauge").value);
   const Index widest = std::min<Index>(static_cast<Index>(latest / run.dt), motion.begin);

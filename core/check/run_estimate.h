@@ -84,7 +84,7 @@ struct Waveform {
   double misfit_if_late = 0;  ///< with the simulation that much later
 };
 
-/// Of a step with rests that does not stall; costs two simulations.
+/// Of a step with rests, that of a stalled section with the slope that stall leaves; costs two simulations.
 Waveform waveform(const CheckModel& model, const Run& run, const RunEstimate& estimated, double stiffness, double apparent);
 
 }  // namespace unrig

@@ -29,8 +29,8 @@ PHYSICAL = {
     "glbf": ("lbf for N", STEPS, "lbf", True),
     "ms": ("ms written as s", RUNS, "ms written as s", True),
     "slowclock": ("clock twice too slow", RUNS, "twice too slow", True),
-    "speed2": ("twice the speed", ["step_a", "step_c"], "twice the true speed", True),  # of step_b too much by 2.5: see "speed too high"
-    "speedft": ("ft/s written as m/s", ["step_a", "step_c"], "ft/s", True),
+    "speed2": ("twice the speed", STEPS, "twice the true speed", True),
+    "speedft": ("ft/s written as m/s", STEPS, "ft/s", True),
     "air": ("water labelled air", ["wet_pluck"] + STEPS, "labelled air", True),
     "water": ("air labelled water", ["dry_pluck"], "labelled water", False),
     "rhog": ("g/cc written as kg/m^3", ["wet_pluck"] + STEPS, r"g/cm\^3|g/cc|labelled air", True),  # 0.998 kg/m^3 is air
