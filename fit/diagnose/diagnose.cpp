@@ -359,7 +359,8 @@ struct Laws {
 bool leaves_something(const Trial& t) { return what_remains(t).found; }
 
 /// The law of what no effect explains: beside nothing, since an effect of the list may stand in for it, and beside the best set. A law that is on the list goes by its id: an effect of the list comes first where
-/// no form is decisively better. Where the best of both is named, no set that was tried is decisively better, and it is decisively better than what was `found`, it is in `found`.
+/// no form is decisively better. What leaves nothing comes before the rest: of sets that set decays aside the evidence is that of the other runs. Where the first is named, leaves nothing or is no worse than any
+/// set that was tried, and is decisively better than what was `found`, it is in `found`.
 std::optional<Laws> look_for_laws(const DiagnoseProblem& problem, FitProblem& fit_problem, const Setting& files, const Trial& baseline, Selection& selection, Explanation& found) {
   Laws laws;
   const auto look_beside = [&](const Trial& base) {
@@ -375,12 +376,14 @@ std::optional<Laws> look_for_laws(const DiagnoseProblem& problem, FitProblem& fi
   std::stable_sort(laws.tried.begin(), laws.tried.end(), [](const Trial& a, const Trial& b) { return bic_difference(a, b) < 0; });
   fit_problem.rig.laws.clear();
   if (laws.tried.empty()) return std::nullopt;
-  const auto listed = std::find_if(laws.tried.begin(), laws.tried.end(), [](const Trial& t) { return !is_law_id(t.effects.back()); });
-  if (listed != laws.tried.end() && bic_difference(*listed, laws.tried.front()) < decisive) std::rotate(laws.tried.begin(), listed, listed + 1);
+  const auto rest = std::stable_partition(laws.tried.begin(), laws.tried.end(), [](const Trial& t) { return !leaves_something(t); });
+  const auto last = rest == laws.tried.begin() ? laws.tried.end() : rest;
+  const auto listed = std::find_if(laws.tried.begin(), last, [](const Trial& t) { return !is_law_id(t.effects.back()); });
+  if (listed != last && bic_difference(*listed, laws.tried.front()) < decisive) std::rotate(laws.tried.begin(), listed, listed + 1);
   fit_problem.rig.laws = laws.tried.front().arrival.joint.model().rig().laws;
   Explanation with = look_at(problem, files, baseline, files, laws.tried.front(), 0);
-  const bool best_of_all = bic_difference(with.best, baseline) < selection.ranking().front().delta_bic + decisive;
-  if (naming_of(with.best, baseline, with.clean(), with.predicts) != Naming::named || !best_of_all || !(bic_difference(with.best, found.best) < -decisive)) {
+  const bool holds = with.clean() || bic_difference(with.best, baseline) < selection.ranking().front().delta_bic + decisive;
+  if (naming_of(with.best, baseline, with.clean(), with.predicts) != Naming::named || !holds || !(bic_difference(with.best, found.best) < -decisive)) {
     fit_problem.rig.laws.clear();
     return std::nullopt;
   }
