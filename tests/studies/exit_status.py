@@ -16,13 +16,13 @@ import tempfile
 def columns(path):
     with open(path) as f:
         rows = list(csv.reader(line for line in f if not line.startswith("#")))
-    return {name.split(" [")[0]: [float(row[i]) for row in rows[1:]] for i, name in enumerate(rows[0]) if not name.startswith("made by")}
+    return {name.split(" [")[0]: [float(row[i] or "nan") for row in rows[1:]] for i, name in enumerate(rows[0]) if not name.startswith("made by")}
 
 
 def error(corrected, truth):
     """r.m.s. over the range, and over the standard deviation, in which the first sample has none."""
     load, std, true = columns(corrected)["circulatory"], columns(corrected)["circulatory_std"], columns(truth)["circulatory"]
-    pairs = list(zip(load, std, true))
+    pairs = [(a, s, t) for a, s, t in zip(load, std, true) if not math.isnan(a)]  # empty where no load is known
     off = math.sqrt(sum((a - t) ** 2 for a, _, t in pairs) / len(pairs))
     scaled = [((a - t) / s) ** 2 for a, s, t in pairs if s > 0]
     return off / (max(true) - min(true)), math.sqrt(sum(scaled) / len(scaled))
