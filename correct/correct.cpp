@@ -4,12 +4,15 @@
 #include <cmath>
 #include <functional>
 #include <iterator>
+#include <set>
 #include <tuple>
 #include <utility>
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include "core/effects/effect.h"
+#include "core/files/text_file.h"
 #include "core/numerics/in_parallel.h"
 #include "core/model/indicial_table.h"
 #include "core/law/law_effect.h"
@@ -29,6 +32,7 @@
 #include "fit/likelihood/explained.h"
 #include "fit/likelihood/run_residual.h"
 #include "fit/likelihood/share_followed.h"
+#include "fit/uncertainty/coloured_noise.h"
 
 namespace unrig {
 namespace {
@@ -147,14 +151,52 @@ MatrixXd interpolated(const MatrixXd& value, const std::vector<Index>& at, Index
   return all;
 }
 
-/// By how much more than noise what a run is left with moves its circulatory load; 1 at least, and where it has no number.
-double moved_beyond_noise(const RunResidual& residual, const RunResidual::Evaluation& e, const Prior& prior, const VectorXd& theta, double reduced_chi2) {
-  if (!std::isfinite(reduced_chi2)) return 1;
+/// Whether what the fit left of one run may be in another one's readings too: of a run without a stream always, of one with a stream where something remains of the other run as well. Else a load that builds
+/// up in another way than the fit's would count, which is what is estimated.
+bool tells_of_others(const LeftByFit& left, bool remains) { return !left.in_stream || remains; }
+
+/// Density of what the fit left of such runs: the mean of those without a stream, or of those with one, whichever is larger at this frequency.
+double left_by_fit(const std::vector<LeftByFit>& left, bool remains, const std::string& channel, double frequency) {
+  double sum[2] = {0, 0}, count[2] = {0, 0};
+  for (const LeftByFit& one : left) {
+    if (one.channel != channel || !tells_of_others(one, remains)) continue;
+    sum[one.in_stream] += one.power.at(frequency);
+    ++count[one.in_stream];
+  }
+  return std::max(sum[0] / std::max(1.0, count[0]), sum[1] / std::max(1.0, count[1]));
+}
+
+/// What moves the answers of a run beyond the noise of its readings.
+struct BeyondNoise {
+  double own = 1;                      ///< how much more what the run is left with moves the circulatory load than noise of its size would; at least 1
+  MatrixXd of_fit;                     ///< what the fit left of its runs' readings, on (theta, c) of this one (disturbance_root); empty: nothing
+  std::set<std::string> unexplained;   ///< those runs
+};
+
+/// Whether what is left of a run at rest is not white, at the level of the fit's standard errors.
+bool is_coloured(const RunResidual& residual, const RunResidual::Sensitivity& sensitivity) {
+  constexpr double significant = 0.01;
+  std::vector<VectorXd> at_rest;
+  for (const auto& channel : sensitivity.channels) at_rest.push_back(residual_at_rest(channel.residual, residual.motion().phases(), residual.linear_unknowns()));
+  return whiteness(at_rest) < significant;
+}
+
+BeyondNoise moved_beyond_noise(const RunResidual& residual, const RunResidual::Evaluation& e, const Prior& prior, const VectorXd& theta, double reduced_chi2, const FittedRig& fit) {
+  const bool explained = reduced_chi2 <= most_of_noise(residual.degrees_of_freedom());
+  BeyondNoise beyond;
+  if (!std::isfinite(reduced_chi2) || (explained && fit.left.empty())) return beyond;
+  const RunResidual::Sensitivity sensitivity = residual.sensitivity(theta);
+  const MatrixXd root = theta_root(e, prior);
+  const bool remains = !explained || is_coloured(residual, sensitivity);
+  for (const LeftByFit& one : fit.left)
+    if (tells_of_others(one, remains)) beyond.unexplained.insert(base_name(one.run));
+  if (!beyond.unexplained.empty()) beyond.of_fit = disturbance_root(residual, sensitivity, e, root, [&](const std::string& channel, double frequency) { return left_by_fit(fit.left, remains, channel, frequency); });
+  if (explained) return beyond;
   const RigidLoad load = load_at(residual, theta, e.linear, chosen_samples(residual.motion()), {});
   MatrixXd by_theta = load.circulatory_by_theta + load.circulatory_by_motion * e.linear_slope.topRows(load.circulatory_by_motion.cols());
   by_theta.rowwise() += steady_per_reading(residual.model().rig()) * e.linear_slope.row(residual.first_offset());
-  const double moved = misfit_over_noise(residual.sensitivity(theta), theta_root(e, prior), by_theta, reduced_chi2);
-  return moved > 1 ? moved : 1;
+  beyond.own = std::max(1.0, misfit_over_noise(sensitivity, root, by_theta, reduced_chi2));
+  return beyond;
 }
 
 /// Where the rigid rig goes on from behind a leg, with its motion following theta.
@@ -275,6 +317,11 @@ std::string too_short_for_a_limit(const Run& run, double semichords) {
   return fmt::format("{}: the record ends {:.2g} semichords after the shaft sets out. It says what the load is there, but not how much of that is the slope and how much the response: both are "
                      "extrapolated, with errors that are too small. Record {:g} semichords or more.",
                      run.file, semichords, shortest_response);
+}
+
+std::string fit_leaves(const CorrectProblem& problem, const std::set<std::string>& runs) {
+  return fmt::format("{}: {} does not explain {}. What it leaves of their readings would read as a load here, and widens the band. `unrig diagnose` looks for what is missing.", problem.run.file, problem.fit.file,
+                     fmt::join(runs, ", "));
 }
 
 /// Samples behind the onset.
@@ -413,14 +460,18 @@ CorrectResult correct_at(const CorrectProblem& problem, const FittedNumbers* num
     together = legs.look_at(search.solution, search.prior, result.calibration_uncertainty > 0);
     result.reduced_chi2 = together.all.chi2 / static_cast<double>(legs.degrees_of_freedom() - static_cast<Index>(search.prior.free.size()));
   };
-  double beyond_noise = 1;
-  const auto budget_of = [&](std::size_t leg, const Prior& by, double calibration) { return legs.budget(leg, together, by, calibration, beyond_noise * std::sqrt(std::max(1.0, result.reduced_chi2))); };
+  BeyondNoise beyond_noise;
+  const auto budget_of = [&](std::size_t leg, const Prior& by, double calibration) {
+    UncertaintyBudget budget = legs.budget(leg, together, by, calibration, beyond_noise.own * std::sqrt(std::max(1.0, result.reduced_chi2)));
+    if (beyond_noise.of_fit.size() > 0) budget.add(Source::gauge, beyond_noise.of_fit);
+    return budget;
+  };
   if (problem.imposed.any()) {
     look_at(free);
     result.indicial = indicial_response(model, free.solution.theta, budget_of(0, free.prior, result.calibration_uncertainty), length, result.semichords_per_second);
   }
   look_at(best);
-  if (legs.size() == 1 && result.reduced_chi2 > most_of_noise(legs.degrees_of_freedom())) beyond_noise = moved_beyond_noise(legs.residual(0), together.all, best.prior, theta, result.reduced_chi2);
+  if (legs.size() == 1) beyond_noise = moved_beyond_noise(legs.residual(0), together.all, best.prior, theta, result.reduced_chi2, problem.fit);
   const UncertaintyBudget of_theta = budget_of(0, best.prior, result.calibration_uncertainty);
   const std::vector<RunResidual::Evaluation>& by_leg = legs.by_leg(best.solution);
 
@@ -443,7 +494,8 @@ CorrectResult correct_at(const CorrectProblem& problem, const FittedNumbers* num
   result.amplitudes = static_cast<Index>(best.prior.amplitudes.size());
   result.in_fit = !best.prior.held.empty();
   if (numbers) add_numbers({legs, model, best, *numbers, result.indicial.semichords}, result);
-  look_at_what_is_left(run, legs.degrees_of_freedom(), beyond_noise, result);
+  if (!beyond_noise.unexplained.empty()) result.warnings.push_back(fit_leaves(problem, beyond_noise.unexplained));
+  look_at_what_is_left(run, legs.degrees_of_freedom(), beyond_noise.own, result);
   return result;
 }
 

@@ -8,6 +8,7 @@
 #include "core/rig/rig.h"
 #include "core/run/run.h"
 #include "core/model/wagner.h"
+#include "fit/likelihood/left_in_octaves.h"
 #include "fit/likelihood/noise_colour.h"
 #include "fit/uncertainty/determined.h"
 #include "fit/uncertainty/profile.h"
@@ -50,6 +51,7 @@ struct FittedChannel {
   double noise = 0;          ///< standard deviation of the channel's white part, estimated from its differences
   std::size_t clipped = 0;   ///< left out as readings at the end of the converter's range
   std::size_t bad = 0;       ///< left out as isolated bad readings
+  LeftInOctaves left;        ///< what the model leaves beyond its noise; no octaves where it explains the run
 };
 
 struct FittedRun {
@@ -60,6 +62,7 @@ struct FittedRun {
   double chi2 = 0;
   Eigen::Index degrees_of_freedom = 0;
   std::vector<FittedChannel> channels;  ///< the fitted outputs, then `alpha` where the motion was estimated
+  bool in_stream = false;
   bool aside = false;    ///< it crosses the corners of a law for so long that no search follows it: it had no part in the fit
   double whiteness = 1;  ///< probability that white noise looks at least as coloured as the residual
   double followed = 1;   ///< share of the readings' variance that the model follows (fit/likelihood/share_followed.h), of the channel that it follows least

@@ -113,6 +113,7 @@ FittedRun describe_run(const RunResidual& residual, const VectorXd& theta, doubl
   fitted.samples = run.samples();
   fitted.chi2 = chi2;
   fitted.degrees_of_freedom = residual.degrees_of_freedom();
+  fitted.in_stream = run.speed > 0;
   fitted.aside = residual.is_aside();
   const auto add = [&](const std::string& name, const VectorXd& model, const VectorXd& weight, double noise) {
     const Channel& channel = run.channel(name);
@@ -125,6 +126,7 @@ FittedRun describe_run(const RunResidual& residual, const VectorXd& theta, doubl
     c.samples = (weight.array() > 0).count();
     c.rms_residual = rms(channel.value - model, weight);
     c.noise = noise;
+    if (!fitted.explained() && !fitted.aside) c.left = left_in_octaves(channel.value - model, weight, run.dt, noise);
     fitted.channels.push_back(c);
   };
   for (std::size_t c = 0; c < p.channels.size(); ++c) {

@@ -94,6 +94,25 @@ std::vector<ChannelColour> read_noise_colour(const json& in) {
   return all;
 }
 
+json numbers(const Eigen::VectorXd& x) {
+  json list = json::array();
+  for (const double value : x) list.push_back(number(value));
+  return list;
+}
+
+/// What the fit left of a run.
+void read_left(const json& run, FittedRig& fit) {
+  for (const json& channel : run.value("channels", json::array())) {
+    if (!channel.contains("left")) continue;
+    const json& left = channel["left"];
+    const auto density = left.at("density").get<std::vector<double>>();
+    LeftByFit one{run.value("file", ""), channel.at("name").get<std::string>(), run.value("in_stream", false), {left.at("from").get<double>(), {}}};
+    one.power.density = Eigen::Map<const Eigen::VectorXd>(density.data(), static_cast<Eigen::Index>(density.size()));
+    if (!(one.power.from > 0) || !(one.power.density.array() >= 0).all()) throw std::invalid_argument("a \"left\" without a positive frequency and densities of at least 0");
+    fit.left.push_back(std::move(one));
+  }
+}
+
 /// The numbers that stated their uncertainty, and their covariance with the parameters.
 void add_givens(const FitResult& r, json& out) {
   out["givens"] = json::array();
@@ -216,11 +235,13 @@ std::string to_json(const FitResult& r, const std::vector<std::shared_ptr<const 
   out["runs"] = json::array();
   for (const FittedRun& run : r.runs) {
     json channels = json::array();
-    for (const FittedChannel& c : run.channels)
+    for (const FittedChannel& c : run.channels) {
       channels.push_back({{"name", c.name}, {"unit", c.unit}, {"samples", c.samples}, {"missing", c.missing}, {"spikes", c.spikes + static_cast<Eigen::Index>(c.bad)}, {"clipped", c.clipped},
                           {"rms_residual", number(c.rms_residual)}, {"noise", number(c.noise)}});
+      if (c.left.density.size() > 0) channels.back()["left"] = {{"from", c.left.from}, {"unit", "Hz"}, {"density", numbers(c.left.density)}};
+    }
     const FittedChannel& first = run.channels.front();
-    out["runs"].push_back({{"file", run.file}, {"fingerprint", run.fingerprint}, {"onset_angle", number(run.onset_angle)}, {"samples", run.samples}, {"rms_residual", number(first.rms_residual)}, {"noise", number(first.noise)},
+    out["runs"].push_back({{"file", run.file}, {"fingerprint", run.fingerprint}, {"onset_angle", number(run.onset_angle)}, {"in_stream", run.in_stream}, {"samples", run.samples}, {"rms_residual", number(first.rms_residual)}, {"noise", number(first.noise)},
                            {"unit", first.unit}, {"reduced_chi2", number(run.reduced_chi2())}, {"whiteness", number(run.whiteness)}, {"explained", run.explained()},
                            {"followed", number(run.followed)}, {"set_aside", run.aside}, {"channels", channels}});
   }
@@ -294,6 +315,7 @@ FittedRig read_fit(const json& in, const std::string& path) {
     for (const json& run : in.value("runs", json::array())) {
       fit.runs.push_back(run.value("file", ""));
       fit.fingerprints.push_back(run.value("fingerprint", ""));
+      read_left(run, fit);
       fit.onset_angles.push_back(run.contains("onset_angle") && run["onset_angle"].is_number() ? run["onset_angle"].get<double>() : std::nan(""));
     }
     return fit;

@@ -12,6 +12,13 @@ namespace unrig {
 /// Throws std::invalid_argument where a law at work is not among them.
 std::string to_json(const FitResult& result, const std::vector<std::shared_ptr<const Effect>>& laws = {});
 
+/// What a fit left of a channel of a run that it does not explain.
+struct LeftByFit {
+  std::string run, channel;
+  bool in_stream = false;
+  LeftInOctaves power;
+};
+
 /// Parameters of a `fit.json`, as far as `simulate` and `correct` need them.
 struct FittedRig {
   std::string file;
@@ -24,6 +31,7 @@ struct FittedRig {
   std::vector<FittedParameter> parameters;
   Eigen::MatrixXd correlation;
   std::vector<ChannelColour> noise_colour;  ///< FitResult::noise_colour
+  std::vector<LeftByFit> left;              ///< FittedChannel::left; empty in a fit.json of an earlier version
   std::vector<FittedGiven> givens;     ///< numbers that stated their uncertainty, as they came out
   Eigen::MatrixXd joint_covariance;    ///< of `parameters`, then `givens`; empty without givens
   std::vector<std::string> runs;

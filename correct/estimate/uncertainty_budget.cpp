@@ -157,10 +157,21 @@ UncertaintyBudget::UncertaintyBudget(const RunResidual::Evaluation& e, const Pri
     source(Source::rig) << answer, e.linear_slope * answer;
   }
   source(Source::calibration) = calibration_uncertainty * reading(F, gauge);
+  gather();
+}
 
+void UncertaintyBudget::add(Source s, const MatrixXd& columns) {
+  MatrixXd& all = by_source_[static_cast<std::size_t>(s)];
+  const Index before = all.cols();
+  all.conservativeResize(columns.rows(), before + columns.cols());
+  all.rightCols(columns.cols()) = columns;
+  gather();
+}
+
+void UncertaintyBudget::gather() {
   Index columns = 0;
   for (const MatrixXd& s : by_source_) columns += s.cols();
-  root_.resize(F.rows(), columns);
+  root_.resize(by_source_.front().rows(), columns);
   Index at = 0;
   for (const MatrixXd& s : by_source_) root_.middleCols(at, s.cols()) = s, at += s.cols();
 }

@@ -71,6 +71,9 @@ class UncertaintyBudget {
   using AnswerToReading = std::function<Eigen::VectorXd(const Eigen::MatrixXd& F, const Eigen::MatrixXd& gauge)>;
   UncertaintyBudget(const RunResidual::Evaluation& e, const Prior& prior, const SharesOf& shares, const AnswerToReading& reading, double calibration_uncertainty, double inflation);
 
+  /// Further columns over (theta, c) of a source.
+  void add(Source s, const Eigen::MatrixXd& columns);
+
   /// Of quantities that move with theta and c by these rows.
   UncertaintyBySource of(const Eigen::MatrixXd& by_theta, const Eigen::MatrixXd& by_c) const;
 
@@ -81,6 +84,7 @@ class UncertaintyBudget {
   Eigen::Index first_column(Source s) const;
 
  private:
+  void gather();
   Eigen::MatrixXd root_;  ///< over (theta, c)
   std::array<Eigen::MatrixXd, static_cast<std::size_t>(sources)> by_source_;
 };

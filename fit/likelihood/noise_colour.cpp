@@ -155,6 +155,12 @@ bool is_white(const VectorXd& relative) {
 
 }  // namespace
 
+double NoiseColour::density(double frequency, double dt) const {
+  const Eigen::ArrayXd pole = poles(corner, dt), one_minus = 1 - pole;
+  const double half = std::sin(std::numbers::pi * frequency * dt);
+  return 2 * dt * (white + (power.array() * one_minus * (1 + pole) / (one_minus.square() + 4 * pole * half * half)).sum());
+}
+
 namespace {
 
 bool leaves_white(const std::vector<Stretch>& stretches, const VectorXd& powers) {

@@ -21,6 +21,8 @@ struct NoiseColour {
 
   /// Variance of the whole.
   double variance() const { return white + power.sum(); }
+  /// Its one-sided spectrum, of samples `dt` [s] apart, at a frequency [Hz]; per Hz.
+  double density(double frequency, double dt) const;
 };
 
 struct ChannelColour {
