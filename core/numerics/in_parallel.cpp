@@ -7,6 +7,8 @@
 #include <thread>
 #include <vector>
 
+#include "core/numerics/time_limit.h"
+
 namespace unrig {
 namespace {
 
@@ -32,6 +34,7 @@ void in_parallel(std::size_t count, const std::function<void(std::size_t)>& work
   std::mutex failing;
   const auto worker = [&] {
     for (std::size_t i = next++; i < count; i = next++) try {
+        TimeLimit::check();
         work(i);
       } catch (...) {
         const std::lock_guard lock(failing);

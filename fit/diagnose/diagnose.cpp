@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <functional>
 #include <memory>
 #include <set>
 
@@ -13,6 +14,7 @@
 #include "core/law/law_effect.h"
 #include "core/rig/fingerprint.h"
 #include "core/numerics/in_parallel.h"
+#include "core/numerics/time_limit.h"
 #include "fit/search/decays_first.h"
 #include "fit/diagnose/heldout.h"
 #include "fit/diagnose/rig_description.h"
@@ -46,6 +48,32 @@ Naming naming_of(const Trial& best, const Trial& baseline, bool clean, bool pred
   const bool only_signals = std::all_of(best.effects.begin(), best.effects.end(), [&](const std::string& id) { return is_a_signal(id, best.arrival.joint); });
   return only_signals ? Naming::only_signals : Naming::named;
 }
+
+/// The time that a diagnosis may take, over the parts of it that search [s of the processor]; 0: any.
+class SearchTime {
+ public:
+  explicit SearchTime(double limit) : until_(limit > 0 ? processor_seconds() + limit : INFINITY) {}
+
+  bool is_up() const { return is_up_; }
+  /// Searches unless the time is up; what the search has changed by then stands.
+  void spend(const std::function<void()>& search) {
+    if (is_up_ || std::isinf(until_)) {
+      if (!is_up_) search();
+      return;
+    }
+    const TimeLimit limit(until_);
+    try {
+      search();
+      is_up_ = TimeLimit::is_lifted();
+    } catch (const OutOfTime&) {
+      is_up_ = true;
+    }
+  }
+
+ private:
+  double until_;
+  bool is_up_ = false;
+};
 
 /// A rig and its runs: as the files have them, or as their description was put right.
 struct Setting {
@@ -327,7 +355,9 @@ Explanation laws_beside(const RigDescription& description, const DiagnoseProblem
   DiagnoseProblem there = problem;
   there.rig = description.problem->rig;
   Selection beside(there, *description.problem, description.trial);
-  Explanation with = look_at(problem, files, baseline, {description.problem.get(), &description.heldout}, beside.best_set(), description.cost);
+  Trial best = beside.best_set();
+  if (beside.stopped()) throw OutOfTime{};
+  Explanation with = look_at(problem, files, baseline, {description.problem.get(), &description.heldout}, std::move(best), description.cost);
   for (Candidate c : beside.ranking()) {
     if (c.effects.empty()) continue;
     c.effects.insert(c.effects.begin(), rig_description_id);
@@ -338,12 +368,12 @@ Explanation laws_beside(const RigDescription& description, const DiagnoseProblem
 }
 
 /// The rig's description against the laws that were `found`: with laws `beside` it, as far as these were looked for, where neither explains everything. True where it is the better explanation, then in `found`.
-bool weigh(const DiagnoseProblem& problem, const Setting& files, const Trial& baseline, const RigDescription& description, std::optional<Explanation> beside, Selection& selection, Explanation& found) {
+bool weigh(const DiagnoseProblem& problem, const Setting& files, const Trial& baseline, const RigDescription& description, std::optional<Explanation> beside, Selection& selection, SearchTime& time, Explanation& found) {
   const double against_baseline = bic_difference(description.trial, baseline) + description.cost;
   selection.add({{rig_description_id}, description.trial.reduced_chi2(), against_baseline, 0, description.promised});
   if (found.explains() && against_baseline > -decisive) return false;
   Explanation with = beside ? std::move(*beside) : look_at(problem, files, baseline, {description.problem.get(), &description.heldout}, description.trial, description.cost);
-  if (!with.explains() && !found.explains() && !beside) with = laws_beside(description, problem, files, baseline, selection);
+  if (!with.explains() && !found.explains() && !beside) time.spend([&] { with = laws_beside(description, problem, files, baseline, selection); });
   const bool laws_named = !found.best.effects.empty() && naming_of(found.best, baseline, found.clean(), found.predicts) == Naming::named;
   if (!with.explains() || (laws_named && bic_difference(found.best, with.best) - with.cost < -decisive)) return false;
   found = std::move(with);
@@ -406,6 +436,7 @@ void tell_laws(FitProblem& fit_problem, const Laws& laws, const Explanation& fou
 Diagnosis diagnose_in_order(const DiagnoseProblem& problem, bool numbers_known) {
   if (!numbers_known && states_errors(problem.rig, problem.runs)) return diagnose_inexact(problem);
   const auto begin = std::chrono::steady_clock::now();
+  SearchTime time(problem.limit);
   const auto tell = [&](const std::string& what) {
     if (problem.progress) problem.progress(what);
   };
@@ -423,11 +454,12 @@ Diagnosis diagnose_in_order(const DiagnoseProblem& problem, bool numbers_known) 
   bool coloured = d.mismatch.found && explained_by_noise(in_colour);
   if (coloured) {
     tell("noise of a colour explains what is left; asking whether effects explain it better");
-    coloured = !effects_beat_noise(problem, fit_problem, baseline, in_colour);
+    time.spend([&] { coloured = !effects_beat_noise(problem, fit_problem, baseline, in_colour); });
   }
   if (coloured) baseline = std::move(in_colour);
   if (coloured) d.mismatch = locate_mismatch(baseline.arrival.joint);
-  std::optional<RigDescription> description = d.mismatch.found && !numbers_known ? describe_rig(problem, baseline) : std::nullopt;
+  std::optional<RigDescription> description;
+  if (d.mismatch.found && !numbers_known) time.spend([&] { description = describe_rig(problem, baseline); });
   // What a set leaves may be noise that is not white, in which all is to be held against each other anew, or the rig's description.
   const Setting files{&fit_problem, &problem.heldout};
   auto selection = std::make_unique<Selection>(problem, fit_problem, baseline);
@@ -435,7 +467,9 @@ Diagnosis diagnose_in_order(const DiagnoseProblem& problem, bool numbers_known) 
   std::optional<Explanation> beside;  // the rig's description and laws
   const auto noise_or_rig = [&](const Trial& set) {
     if (Trial there = set; !coloured && explained_by_noise(there)) {
-      take_noise_of(baseline, there);
+      Trial in_its_noise = baseline;
+      take_noise_of(in_its_noise, there);
+      baseline = std::move(in_its_noise);
       return coloured = anew = true;
     }
     if (asked || (description && description->left < explained)) return false;
@@ -449,18 +483,22 @@ Diagnosis diagnose_in_order(const DiagnoseProblem& problem, bool numbers_known) 
     beside = std::move(with);
     return true;
   };
-  Trial best_set = selection->best_set(noise_or_rig);
+  Trial best_set = baseline;
+  time.spend([&] { best_set = selection->best_set(noise_or_rig); });
   if (anew) {
     tell("trying what may be missing, in noise of the colour that is left");
     d.mismatch = locate_mismatch(baseline.arrival.joint);
     selection = std::make_unique<Selection>(problem, fit_problem, baseline);
-    best_set = selection->best_set(noise_or_rig);
+    best_set = baseline;
+    time.spend([&] { best_set = selection->best_set(noise_or_rig); });
   }
   if (!problem.verdict_only) d.maps = residual_maps(baseline.arrival.joint, d.mismatch.runs);
   Explanation found = look_at(problem, files, baseline, files, std::move(best_set), 0);
-  const bool described = description && weigh(problem, files, baseline, *description, std::move(beside), *selection, found);
+  const bool described = description && weigh(problem, files, baseline, *description, std::move(beside), *selection, time, found);
   std::optional<Laws> laws;
-  if (problem.laws && !problem.verdict_only && problem.effects.empty() && d.mismatch.found && !described && !found.explains()) laws = look_for_laws(problem, fit_problem, files, baseline, *selection, found);
+  if (problem.laws && !problem.verdict_only && problem.effects.empty() && d.mismatch.found && !described && !found.explains())
+    time.spend([&] { laws = look_for_laws(problem, fit_problem, files, baseline, *selection, found); });
+  if (!laws) fit_problem.rig.laws.clear();
   const Trial& best = found.best;
   d.ranking = selection->ranking();
   d.remaining = found.remaining;
@@ -486,6 +524,7 @@ Diagnosis diagnose_in_order(const DiagnoseProblem& problem, bool numbers_known) 
     for (MissingEffect& m : effects_of(found, fit_problem.rig, d)) set.push_back(std::move(m));
     if (laws) tell_laws(fit_problem, *laws, found, set, d);
   }
+  d.stopped = time.is_up();
   d.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
   return d;
 }

@@ -32,6 +32,7 @@ struct DiagnoseProblem {
   bool verdict_only = false;          ///< neither maps nor predictions, nor descriptions of the fits, nor the missing force
   std::vector<std::string> effects;   ///< candidates; empty: all that can act in these runs
   bool laws = true;                   ///< where no effect explains the runs and no candidates are named, their law is looked for (fit/laws/law_search.h)
+  double limit = 0;                   ///< processor time after which the search ends with what it has found [s]; 0: none
   std::function<void(const std::string&)> progress;
 };
 
@@ -92,6 +93,7 @@ struct Diagnosis {
   FitResult after;
   std::vector<std::shared_ptr<const Effect>> laws;  ///< that are at work in `after`
   std::vector<MissingForce> missing_force;  ///< where something is unexplained: what would explain it
+  bool stopped = false;  ///< by the limit of time: sets that were not tried may explain more
   double seconds = 0;
 };
 
@@ -106,6 +108,8 @@ struct Diagnosis {
 /// An effect is named only where no significant mismatch remains beside the set it belongs to, or nearly all of the excess is gone (which is not enough for signals
 /// with amplitudes of their own in every run), and where runs that were not fitted are predicted better with it than without: those held out or, where there are
 /// none, each fitted run from the others. Otherwise the mismatch is unexplained, and the force is given that would explain it.
+///
+/// A limit of time ends the search, not the description of what it found. One diagnosis at a time has one: processor time is the process's (core/numerics/time_limit.h).
 ///
 /// No digit of it depends on the order of the runs (fit/likelihood/run_order.h).
 /// Throws InputError where a run does not belong to the rig.

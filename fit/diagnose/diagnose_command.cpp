@@ -51,6 +51,7 @@ int diagnose_command(int argc, char** argv) {
   app.add_option("--effects", ids, "candidates, separated by commas; without it, all that can act in these runs")->delimiter(',')->allow_extra_args(false);
   bool no_law = false;
   app.add_flag("--no-law", no_law, "does not look for a law where no effect explains the runs");
+  app.add_option("--limit", problem.limit, "seconds of processor time after which the search ends with what it has found; without it, none")->check(CLI::PositiveNumber);
   app.add_option_function<int>("--threads", use_threads, "how many threads to work in; without it, as many as the machine has")->check(CLI::Range(1, 256));
   app.add_option("--fit", fit_output, "writes the winning fit too (fit.json), for simulate and correct");
   app.add_option("-o,--output", output, "result (JSON)")->required();

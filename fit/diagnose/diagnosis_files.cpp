@@ -97,6 +97,8 @@ std::string search_words(const Diagnosis& d) {
   return text + "Unexplained is what the search left, not what all effects leave. Look at rig file and runs, diagnose fewer runs, or name candidates with --effects.";
 }
 
+constexpr const char* stopped_words = "The search ended with its limit of time, not by itself: what was not tried may explain more. Give it more (--limit), or name candidates with --effects.";
+
 bool is_rig_description(const MissingEffect& m) { return m.effect == rig_description_id; }
 
 /// "normal.mass[13] = 0.871 +/- 0.004 kg where the rig file says 0.86".
@@ -222,26 +224,27 @@ std::string to_json(const Diagnosis& d) {
   ordered_json separated = ordered_json::array();
   for (const std::optional<SeparatingRecording>& s : d.separated_by)
     separated.push_back(s ? ordered_json{{"recording", s->what}, {"difference_over_noise", number(s->difference)}, {"as_recorded", number(s->now)}} : ordered_json(nullptr));
-  const ordered_json json = {{"unrig", "diagnosis"},
-                             {"program", d.after.program},
-                             {"command", d.after.command},
-                             {"rig_fingerprint", d.after.rig_fingerprint},
-                             {"verdict", verdict(d)},
-                             {"mismatch", mismatch_json(d.mismatch)},
-                             {"missing", effects_json(d.missing)},
-                             {"equivalent", d.equivalent},
-                             {"separated_by", separated},
-                             {"unexplained", d.unexplained},
-                             {"search", name_of(d.search)},
-                             {"not_followed", d.not_followed},
-                             {"search_summary", search_words(d)},
-                             {"closest", {{"effects", effects_json(d.closest)}, {"share_of_excess_removed", number(d.removed_by_closest)}, {"not_named", d.closest.empty() ? "" : why_not_named(d.naming)}}},
-                             {"remaining", mismatch_json(d.remaining)},
-                             {"improvement", {{"bic_before", number(d.bic_before)}, {"bic_after", number(d.bic_after)}, {"runs", runs}}},
-                             {"price_of_ignorance", shifts},
-                             {"ranking", ranking},
-                             {"missing_force", forces},
-                             {"fit", ordered_json::parse(to_json(d.after, d.laws))}};
+  ordered_json json = {{"unrig", "diagnosis"},
+                       {"program", d.after.program},
+                       {"command", d.after.command},
+                       {"rig_fingerprint", d.after.rig_fingerprint},
+                       {"verdict", verdict(d)},
+                       {"mismatch", mismatch_json(d.mismatch)},
+                       {"missing", effects_json(d.missing)},
+                       {"equivalent", d.equivalent},
+                       {"separated_by", separated},
+                       {"unexplained", d.unexplained},
+                       {"search", name_of(d.search)},
+                       {"not_followed", d.not_followed},
+                       {"search_summary", search_words(d)},
+                       {"closest", {{"effects", effects_json(d.closest)}, {"share_of_excess_removed", number(d.removed_by_closest)}, {"not_named", d.closest.empty() ? "" : why_not_named(d.naming)}}},
+                       {"remaining", mismatch_json(d.remaining)},
+                       {"improvement", {{"bic_before", number(d.bic_before)}, {"bic_after", number(d.bic_after)}, {"runs", runs}}},
+                       {"price_of_ignorance", shifts},
+                       {"ranking", ranking},
+                       {"missing_force", forces},
+                       {"fit", ordered_json::parse(to_json(d.after, d.laws))}};
+  if (d.stopped) json["stopped"] = true;
   return json.dump(2) + "\n";
 }
 
@@ -252,6 +255,7 @@ std::string report(const Diagnosis& d) {
   for (std::size_t i = 0; i < d.equivalent.size(); ++i) text += "    " + cannot_tell(d.equivalent[i], d.separated_by[i]) + "\n";
   if (d.unexplained) text += "[[Unexplained]]\n    " + d.remaining.summary + "\n";
   if (const std::string words = search_words(d); !words.empty()) text += "    " + words + "\n";
+  if (d.stopped) text += fmt::format("[[Stopped]]\n    {}\n", stopped_words);
   for (const std::string& sentence : out_of_proportion(d.after.parameters)) text += "    " + sentence + "\n";
   if (!d.closest.empty()) text += fmt::format("    The set that comes closest removes {:.0f} % of the excess, {}:\n", 100 * d.removed_by_closest, why_not_named(d.naming)) + effects_text(d.closest);
   for (const MissingForce& f : d.missing_force) {

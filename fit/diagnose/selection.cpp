@@ -4,7 +4,6 @@
 #include <cmath>
 #include <iterator>
 #include <memory>
-#include <optional>
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
@@ -12,6 +11,7 @@
 #include "core/effects/effect.h"
 #include "core/law/law_effect.h"
 #include "core/numerics/in_parallel.h"
+#include "core/numerics/time_limit.h"
 #include "fit/search/decays_first.h"
 #include "fit/diagnose/mismatch.h"
 
@@ -34,18 +34,17 @@ void fit_linear(Trials& trials) {
   in_parallel(std::min(trials.size(), most_in_full), [&](std::size_t i) { fit_fully(trials[i], 6); });
 }
 
-/// By the free decays first, the most promising effect first; none after one that leaves nothing of a mismatch too large for two laws to explain alike.
-void fit_nonlinear(const Tell& tell, Trials& trials, const Trial& base) {
+/// Those that were `fitted`: by the free decays first, the most promising effect first; none after one that leaves nothing of a mismatch too large for two laws to explain alike.
+void fit_nonlinear(const Tell& tell, Trials& trials, const Trial& base, Trials& fitted) {
   double least = base.reduced_chi2();
-  for (std::size_t i = 0; i < trials.size(); ++i) {
-    Trial& trial = trials[i];
+  for (Trial& trial : trials) {
     if (tell) tell(fmt::format("trying {}", fmt::join(trial.effects, " with ")));
     follow_nonlinear(trial, base, least);
     least = std::min(least, trial.reduced_chi2());
-    if (!leaves_nothing(trial) || base.reduced_chi2() < nearly_explained) continue;
-    trials.erase(trials.begin() + static_cast<std::ptrdiff_t>(i) + 1, trials.end());
+    fitted.push_back(std::move(trial));
+    if (leaves_nothing(fitted.back()) && base.reduced_chi2() >= nearly_explained) break;
   }
-  std::sort(trials.begin(), trials.end(), [](const Trial& a, const Trial& b) { return a.reduced_chi2() < b.reduced_chi2(); });
+  std::sort(fitted.begin(), fitted.end(), [](const Trial& a, const Trial& b) { return a.reduced_chi2() < b.reduced_chi2(); });
 }
 
 /// What has come to rest at a limit of what its parameters may be, other than zero, and leaves something stands in for something else.
@@ -172,25 +171,31 @@ Trials Selection::try_one_more(const Trial& base, const Strings& hopeless) {
   const bool favours_linear = others.empty() || (!linear.empty() && clearly * linear.front().score >= others.front().score);
   fit_linear(linear);
   keep_distinct(linear);
-  bool done = any_leaves_nothing(linear);
-  if (favours_linear && !done) {
-    fit_anew(fit_problem_, linear);
-    keep_distinct(linear);
-    done = any_leaves_nothing(linear);
-  }
-  if (!done || !favours_linear) {  // a decaying tone may leave nothing of what a weak drag does, and explain it worse
-    fit_nonlinear(problem_.progress, others, base);
-    done = done || any_leaves_nothing(others);
-    if (!done && !favours_linear) fit_anew(fit_problem_, linear);
-    const bool decays_have_told = has_decays(base.arrival.joint);  // from first guesses nonlinear laws are not found where their decays do not lead
-    if (!done && !decays_have_told && !any_leaves_nothing(linear)) fit_anew(fit_problem_, others);
-    if (!done && !any_leaves_nothing(linear) && !any_leaves_nothing(others) && base.effects.empty() && base.reduced_chi2() > nearly_explained) fit_others_anew(fit_problem_, linear);
-    std::move(others.begin(), others.end(), std::back_inserter(linear));
-    if (!any_leaves_nothing(linear)) {  // far from the truth one linear step promises little of what there is
-      fit_anew(fit_problem_, unpromising);
-      std::move(unpromising.begin(), unpromising.end(), std::back_inserter(linear));
+  Trials followed;  // of the others
+  const auto any_does = [&] { return any_leaves_nothing(linear) || any_leaves_nothing(followed); };
+  try {
+    bool done = any_leaves_nothing(linear);
+    if (favours_linear && !done) {
+      fit_anew(fit_problem_, linear);
+      keep_distinct(linear);
+      done = any_leaves_nothing(linear);
     }
+    if (!done || !favours_linear) {  // a decaying tone may leave nothing of what a weak drag does, and explain it worse
+      fit_nonlinear(problem_.progress, others, base, followed);
+      done = done || any_leaves_nothing(followed);
+      if (!done && !favours_linear) fit_anew(fit_problem_, linear);
+      const bool decays_have_told = has_decays(base.arrival.joint);  // from first guesses nonlinear laws are not found where their decays do not lead
+      if (!done && !decays_have_told && !any_leaves_nothing(linear)) fit_anew(fit_problem_, followed);
+      if (!done && !any_does() && base.effects.empty() && base.reduced_chi2() > nearly_explained) fit_others_anew(fit_problem_, linear);
+      if (!any_does()) {  // far from the truth one linear step promises little of what there is
+        fit_anew(fit_problem_, unpromising);
+        std::move(unpromising.begin(), unpromising.end(), std::back_inserter(linear));
+      }
+    }
+  } catch (const OutOfTime&) {  // what has been fitted stands
+    stop();
   }
+  std::move(followed.begin(), followed.end(), std::back_inserter(linear));
   keep_distinct(linear);
   std::sort(linear.begin(), linear.end(), [](const Trial& a, const Trial& b) { return bic_difference(a, b) < 0; });
   std::stable_partition(linear.begin(), linear.end(), plausible);
@@ -254,13 +259,16 @@ void Selection::try_with_all_modes(Trials& tried) {
   std::stable_partition(tried.begin(), tried.end(), plausible);
 }
 
-Trial Selection::best_set(const std::function<bool(const Trial&)>& enough) {
-  Trial best = baseline_;
-  std::optional<Trial> sufficient;  // a law that is followed all but exactly: what it leaves has a name only where that leaves nothing
+void Selection::stop() {
+  TimeLimit::lift();
+  stopped_ = true;
+}
+
+void Selection::grow(Trial& best, const std::function<bool(const Trial&)>& enough, std::optional<Trial>& sufficient) {
   Strings hopeless;  // laws with which alone the fit is worse than without: from that far away they are not found, and are not tried again before half of the way is gone
   constexpr double half_way = 0.5;
-  while (best.effects.size() < most_effects && what_remains(best).found) {
-    best = in_finer_steps(std::move(best));
+  while (!stopped_ && best.effects.size() < most_effects && what_remains(best).found) {
+    best = in_finer_steps(best);
     if (!what_remains(best).found) break;
     if (decays_decide(best) && best.reduced_chi2() > twice_the_noise) break;  // trajectories that are not followed tell nothing of a second effect, in minutes each
     if (!sufficient && nonlinear(best) && best.excess() < (1 - enough_to_name) * baseline_.excess() && leaves_nothing(best)) sufficient = best;
@@ -274,10 +282,27 @@ Trial Selection::best_set(const std::function<bool(const Trial&)>& enough) {
     const Trial next = without_stand_in(tried);
     if (!(best.effects.empty() || plausible(next)) || bic_difference(next, best) > -decisive) break;
     if (next.excess() < half_way * best.excess()) hopeless.clear();
-    best = exchanged(without_superfluous(next), hopeless);
-    judge_decays(best);
+    best = next;
+    if (!stopped_) {
+      Trial settled = exchanged(without_superfluous(next), hopeless);
+      judge_decays(settled);
+      best = std::move(settled);
+    }
     std::move(tried.begin(), tried.end(), std::back_inserter(tried_));
-    if (enough && what_remains(best).found && enough(best)) return best;
+    if (!stopped_ && enough && what_remains(best).found && enough(best)) {
+      sufficient.reset();
+      return;
+    }
+  }
+}
+
+Trial Selection::best_set(const std::function<bool(const Trial&)>& enough) {
+  Trial best = baseline_;
+  std::optional<Trial> sufficient;  // a law that is followed all but exactly: what it leaves has a name only where that leaves nothing
+  try {
+    grow(best, enough, sufficient);
+  } catch (const OutOfTime&) {
+    stop();
   }
   return sufficient && what_remains(best).found ? *sufficient : best;
 }

@@ -1,4 +1,6 @@
 #pragma once
+#include <functional>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -25,6 +27,8 @@ class Selection {
   /// `baseline` itself where no mismatch is found or no effect is worth it. It ends, too, with a set that leaves something where `enough` says so.
   Trial best_set(const std::function<bool(const Trial&)>& enough = {});
 
+  /// Whether the search ended because its time was up (core/numerics/time_limit.h), which is lifted then.
+  bool stopped() const { return stopped_; }
   /// Sets that were fitted in rounds from which the search went on.
   const std::vector<Trial>& tried() const { return tried_; }
   /// A set that was tried elsewhere.
@@ -33,6 +37,8 @@ class Selection {
   std::vector<Candidate> ranking() const;
 
  private:
+  void grow(Trial& best, const std::function<bool(const Trial&)>& enough, std::optional<Trial>& sufficient);
+  void stop();
   std::vector<std::string> candidates(const std::vector<std::string>& at_work, const std::vector<std::string>& hopeless) const;
   std::vector<Trial> try_one_more(const Trial& base, const std::vector<std::string>& hopeless);
   Trial without_superfluous(Trial trial) const;
@@ -48,6 +54,7 @@ class Selection {
   const Trial& baseline_;
   std::vector<Trial> tried_;
   std::vector<Candidate> ranking_;
+  bool stopped_ = false;
 };
 
 }  // namespace unrig
