@@ -13,10 +13,9 @@
 #include "core/files/error.h"
 #include "core/law/law_effect.h"
 #include "core/rig/fingerprint.h"
-#include "core/numerics/in_parallel.h"
 #include "core/numerics/time_limit.h"
-#include "fit/search/decays_first.h"
-#include "fit/diagnose/heldout.h"
+#include "fit/diagnose/as_given.h"
+#include "fit/diagnose/explanation.h"
 #include "fit/diagnose/rig_description.h"
 #include "fit/diagnose/selection.h"
 #include "fit/laws/law_search.h"
@@ -30,24 +29,7 @@ namespace {
 
 using Eigen::Index;
 
-constexpr double half = 0.5;  // of the excess, where decays decide: the search leaves something of the other runs even when it has found what is missing
 constexpr double twice_the_noise = 2;
-
-/// Whether decays that decide are followed, to the noise or in nearly all that they had above it.
-bool follows_decays(const Trial& trial, const Trial& baseline) {
-  if (!decays_decide(trial) || trial.excess() > half * baseline.excess()) return false;
-  const bool nearly = trial.decays.exactly && left_of_decays(trial) - 1 < (1 - enough_to_name) * (left_of_decays(baseline) - 1);
-  return trial.decays.chi2 < explained || nearly;
-}
-
-/// `best` has effects; `clean`: beside them no significant mismatch remains.
-Naming naming_of(const Trial& best, const Trial& baseline, bool clean, bool predicts) {
-  if (!predicts) return Naming::does_not_predict;
-  if (clean || follows_decays(best, baseline)) return Naming::named;
-  if (best.excess() > (1 - enough_to_name) * baseline.excess()) return Naming::removes_too_little;
-  const bool only_signals = std::all_of(best.effects.begin(), best.effects.end(), [&](const std::string& id) { return is_a_signal(id, best.arrival.joint); });
-  return only_signals ? Naming::only_signals : Naming::named;
-}
 
 /// The time that a diagnosis may take, over the parts of it that search [s of the processor]; 0: any.
 class SearchTime {
@@ -75,42 +57,6 @@ class SearchTime {
   bool is_up_ = false;
 };
 
-/// A rig and its runs: as the files have them, or as their description was put right.
-struct Setting {
-  const FitProblem* problem;
-  const std::vector<Run>* heldout;
-};
-
-/// What runs that were not fitted are left with, before and after. `best` is of the rig and the runs of `after`.
-std::vector<ImprovedRun> predict_unseen(const Setting& before, const Arrival& baseline, const Setting& after, const Trial& best) {
-  FitProblem after_problem = *after.problem;
-  after_problem.effects = best.effects;
-  const std::vector<Run>& runs = before.problem->runs;
-  const bool changed = !best.effects.empty() || after.problem != before.problem;
-  const bool leave_out = before.heldout->empty() && runs.size() > 1 && changed;
-  const std::vector<RunResidual>& fitted = best.arrival.joint.runs();
-  const auto has_part = [](const RunResidual& run) { return !run.is_aside(); };
-  const bool others_tell = std::count_if(fitted.begin(), fitted.end(), has_part) > 1;
-  std::vector<std::size_t> predicted;  // not what no search follows, nor what nothing but itself has told of
-  for (std::size_t i = 0; i < (leave_out ? runs.size() : before.heldout->size()); ++i)
-    if (!leave_out || (has_part(fitted[i]) && others_tell)) predicted.push_back(i);
-  std::vector<ImprovedRun> unseen(predicted.size());
-  in_parallel(unseen.size(), [&](std::size_t i) {
-    const std::size_t k = predicted[i];
-    const Run& run = leave_out ? runs[k] : (*before.heldout)[k];
-    const HeldoutResidual b = leave_out ? predict_left_out(baseline, *before.problem, k) : predict_heldout(baseline, *before.problem, run);
-    const HeldoutResidual a = leave_out ? predict_left_out(best.arrival, after_problem, k) : predict_heldout(best.arrival, after_problem, (*after.heldout)[k]);
-    unseen[i] = {run.file, b.channel, run.channel(b.channel).unit, true, leave_out, b.rms, a.rms, a.noise};
-  });
-  return unseen;
-}
-
-double power_over_noise(const std::vector<ImprovedRun>& runs, double ImprovedRun::* rms) {
-  double sum = 0;
-  for (const ImprovedRun& run : runs) sum += std::pow(run.*rms / run.noise, 2);
-  return sum;
-}
-
 /// The fit with nothing missing and every run at its full weight, from where the baseline stands; `thorough`: or from first guesses and the starts around them, as `unrig fit` searches, where that leaves less. Whether it
 /// leaves so much less that the baseline, from which all else was searched, was no place to begin from.
 struct PlainFit {
@@ -132,42 +78,6 @@ PlainFit plain_fit(const FitProblem& problem, const Arrival& baseline, bool thor
 
 bool has_colour(const JointProblem& joint) {
   return std::any_of(joint.runs().begin(), joint.runs().end(), [](const RunResidual& run) { return run.colour(0) != nullptr; });
-}
-
-/// The best set of laws in a setting, and what is to be said of it.
-struct Explanation {
-  Setting setting;
-  Trial best;
-  double cost = 0;  ///< of the setting, as a difference of BIC
-  Mismatch remaining;
-  std::vector<ImprovedRun> unseen;
-  bool predicts = false;
-  FitResult fit = {};
-
-  bool clean() const { return !remaining.found; }
-  bool explains() const { return clean() && predicts; }
-};
-
-/// How much more than before, as a share, runs that were not fitted may be left with: nothing where an effect acts in one of them. Where none does, what chi-square of so many samples scatters by.
-double tolerated(const Setting& files, const std::vector<std::string>& effects) {
-  if (effects.empty()) return 0;
-  const FitProblem& problem = *files.problem;
-  double samples = 0;
-  for (const Run& run : files.heldout->empty() ? problem.runs : *files.heldout) {
-    samples += static_cast<double>(run.samples());
-    for (const std::string& id : effects)
-      if (effect(problem.rig, id).acts(problem.rig, conditions_of(run))) return 0;
-  }
-  return std::sqrt(2 / samples);
-}
-
-Explanation look_at(const DiagnoseProblem& problem, const Setting& files, const Trial& baseline, const Setting& setting, Trial best, double cost) {
-  Explanation e{setting, std::move(best), cost, {}, {}, false};
-  e.remaining = what_remains(e.best);
-  if (!problem.verdict_only) e.unseen = predict_unseen(files, baseline.arrival, setting, e.best);
-  const bool adds_nothing = e.best.effects.empty() && setting.problem == files.problem;
-  e.predicts = adds_nothing || power_over_noise(e.unseen, &ImprovedRun::rms_after) <= (1 + tolerated(files, e.best.effects)) * power_over_noise(e.unseen, &ImprovedRun::rms_before);
-  return e;
 }
 
 /// Both fits in full, and what they leave of the fitted runs. Of an explanation with the rig's description put right `d.after` is the fit with its laws to the rig as the files have it: no fit is told that
@@ -527,36 +437,6 @@ Diagnosis diagnose_in_order(const DiagnoseProblem& problem, bool numbers_known) 
   d.stopped = time.is_up();
   d.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
   return d;
-}
-
-void sort_mismatch(const GivenOrder& given, Mismatch& m) {
-  given.sort(m.channels, [](const ChannelMismatch& c) { return c.run; });
-  const Mismatch was = m;
-  const std::vector<std::size_t> places = given.places(m.runs, [](const std::string& file) { return file; });
-  for (std::size_t i = 0; i < places.size(); ++i) {
-    m.runs[i] = was.runs[places[i]];
-    m.time[i] = was.time[places[i]];
-    m.frequency[i] = was.frequency[places[i]];
-    m.state[i] = was.state[places[i]];
-  }
-}
-
-/// What was found in the order of the search, told in that in which the runs were given.
-void tell_as_given(const GivenOrder& given, std::size_t runs, Diagnosis& d) {
-  sort_mismatch(given, d.mismatch);
-  sort_mismatch(given, d.remaining);
-  for (std::vector<MissingEffect>* effects : {&d.missing, &d.closest})
-    for (MissingEffect& m : *effects) given.sort_by_name(m.parameters);
-  const auto fitted = [](const ImprovedRun& run) { return !run.heldout; };
-  const auto unseen = std::stable_partition(d.runs.begin(), d.runs.end(), fitted);
-  std::vector<ImprovedRun> seen(d.runs.begin(), unseen), others(unseen, d.runs.end());
-  for (std::vector<ImprovedRun>* part : {&seen, &others}) given.sort(*part, [](const ImprovedRun& run) { return run.file; });
-  d.runs = std::move(seen);
-  d.runs.insert(d.runs.end(), others.begin(), others.end());
-  given.sort(d.maps, [](const ResidualMaps& m) { return m.run; });
-  given.sort(d.missing_force, [](const MissingForce& f) { return f.run; });
-  for (FitResult* fit : {&d.before, &d.after})
-    if (fit->runs.size() == runs) tell_as_given(given, *fit);  // a verdict alone has none
 }
 
 }  // namespace
