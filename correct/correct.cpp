@@ -344,21 +344,21 @@ double band_over_change(const CorrectResult& result) {
 }
 
 /// Why load and response say nothing; empty where they do.
-std::string nothing_said(const Run& run, bool explained, const CorrectResult& result) {
+std::string nothing_said(const Run& run, bool explained, double band, const CorrectResult& result) {
   constexpr double half = 0.5, clearly = 3;  // of the variance; standard deviations
   if (!std::isfinite(result.reduced_chi2) || !result.circulatory.std.allFinite())
     return fmt::format("{}: with the rig of the fit the model has no finite answer to this motion. It is not this rig's fit, or a parameter of it is absurd.", run.file);
   if (const double followed = gauge_followed(run, result); followed < half && (!explained || !(std::abs(result.slope) > clearly * result.slope_std)))
     return fmt::format("{}: the model follows {:.0f} % of the gauge's variance. The gauge does not answer to the motion of the shaft, or the rig of the fit is another one. Look at the recording.", run.file,
                        100 * std::max(0.0, followed));
-  if (const double band = band_over_change(result); !explained && !(band < 1))
+  if (!explained && !(band < 1))
     return fmt::format("{}: what is left of gauge and angle (reduced chi-square {:.3g}) may move the load by {:.2g} times of what it changes by. Look at the recording, or ask `unrig diagnose` what the rig lacks.", run.file,
                        result.reduced_chi2, band);
   return "";
 }
 
-/// `widened`: by how much more than as noise what is left widens the band.
-void look_at_what_is_left(const Run& run, Index degrees_of_freedom, double widened, CorrectResult& result) {
+/// `widened`: by how much more than as noise what is left widens the band; `band`: what band_over_change says of what this run itself is left with.
+void look_at_what_is_left(const Run& run, Index degrees_of_freedom, double widened, double band, CorrectResult& result) {
   const bool explained = result.reduced_chi2 <= most_of_noise(degrees_of_freedom);
   if (result.reduced_chi2 < least_of_noise(degrees_of_freedom))
     result.warnings.push_back(fmt::format("{}: gauge and angle are explained to a reduced chi-square of {:.3g}, better than their noise allows. A converter is coarser than the noise, or wrong readings have raised that: look "
@@ -370,7 +370,7 @@ void look_at_what_is_left(const Run& run, Index degrees_of_freedom, double widen
                                           "for it. {}",
                                           run.file, result.reduced_chi2, wider));
   }
-  if (result.no_answer.empty()) result.no_answer = nothing_said(run, explained, result);
+  if (result.no_answer.empty()) result.no_answer = nothing_said(run, explained, band, result);
 }
 
 /// Knots so far apart that what a nonlinear force does to a long motion is hardly in the load; the acceleration of an oscillation is off by (omega h)^2 / 12.
@@ -444,7 +444,7 @@ CorrectResult correct_at(const CorrectProblem& problem, const FittedNumbers* num
   if (windows_by_leg.empty()) {
     correct_restless({model, run, prior, start, length, steady_per_reading(problem.rig), problem.imposed}, result);
     if (numbers) result.warnings.push_back(fmt::format("{}: the shaft hardly ever rests; the band of such a run does not allow for the uncertainties that rig file and run state.", run.file));
-    look_at_what_is_left(run, 2 * run.samples(), 1, result);
+    look_at_what_is_left(run, 2 * run.samples(), 1, band_over_change(result), result);
     return result;
   }
 
@@ -461,8 +461,9 @@ CorrectResult correct_at(const CorrectProblem& problem, const FittedNumbers* num
     result.reduced_chi2 = together.all.chi2 / static_cast<double>(legs.degrees_of_freedom() - static_cast<Index>(search.prior.free.size()));
   };
   BeyondNoise beyond_noise;
+  const auto own_budget = [&](std::size_t leg, const Prior& by, double calibration) { return legs.budget(leg, together, by, calibration, beyond_noise.own * std::sqrt(std::max(1.0, result.reduced_chi2))); };
   const auto budget_of = [&](std::size_t leg, const Prior& by, double calibration) {
-    UncertaintyBudget budget = legs.budget(leg, together, by, calibration, beyond_noise.own * std::sqrt(std::max(1.0, result.reduced_chi2)));
+    UncertaintyBudget budget = own_budget(leg, by, calibration);
     if (beyond_noise.of_fit.size() > 0) budget.add(Source::gauge, beyond_noise.of_fit);
     return budget;
   };
@@ -476,7 +477,12 @@ CorrectResult correct_at(const CorrectProblem& problem, const FittedNumbers* num
   const std::vector<RunResidual::Evaluation>& by_leg = legs.by_leg(best.solution);
 
   const bool in_legs = legs.size() > 1;
-  set_loads(legs, by_leg, [&](std::size_t leg) { return in_legs ? budget_of(leg, best.prior, 0) : of_theta; }, theta, result);
+  const auto set_loads_by = [&](const std::function<UncertaintyBudget(std::size_t leg)>& budget) { set_loads(legs, by_leg, budget, theta, result); };
+  if (in_legs) set_loads_by([&](std::size_t leg) { return own_budget(leg, best.prior, 0); });
+  else if (beyond_noise.of_fit.size() > 0) set_loads_by([&](std::size_t) { return own_budget(0, best.prior, result.calibration_uncertainty); });
+  else set_loads_by([&](std::size_t) { return of_theta; });
+  const double own_band = band_over_change(result);
+  if (beyond_noise.of_fit.size() > 0) set_loads_by([&](std::size_t) { return of_theta; });
   if (in_legs && result.calibration_uncertainty > 0) add_calibration(legs, by_leg, together.answer_to_reading, theta, result);
   IndicialResponse response = indicial_response(model, theta, of_theta, length, result.semichords_per_second);
   if (problem.imposed.any()) response.take_tests_of(result.indicial);
@@ -495,7 +501,7 @@ CorrectResult correct_at(const CorrectProblem& problem, const FittedNumbers* num
   result.in_fit = !best.prior.held.empty();
   if (numbers) add_numbers({legs, model, best, *numbers, result.indicial.semichords}, result);
   if (!beyond_noise.unexplained.empty()) result.warnings.push_back(fit_leaves(problem, beyond_noise.unexplained));
-  look_at_what_is_left(run, legs.degrees_of_freedom(), beyond_noise.own, result);
+  look_at_what_is_left(run, legs.degrees_of_freedom(), beyond_noise.own, own_band, result);
   return result;
 }
 
