@@ -83,6 +83,7 @@ def make_results(out):
     long_chord = write(out / "long_chord.toml", (null / "rig.toml").read_text().replace('chord = "6 in"', 'chord = "6.06 in"'))
     unrig("diagnose", "--rig", long_chord, *(null / run for run in (*decays, "step_a.csv", "step_b.csv", "step_c.csv")), "--effects", "tank-wave", "-o", out / "diagnosis_rig.json")
     unrig("diagnose", *campaign("wave", *decays, "step_a.csv"), "--effects", "coulomb-friction", "-o", out / "diagnosis_unexplained.json", status=(1,))
+    unrig("diagnose", *campaign("wave", *decays, "step_a.csv"), "--limit", "0.001", "-o", out / "diagnosis_stopped.json", status=(1,))
 
     mode = write(out / "mode.toml", 'unrig_rig = 1\nname = "one mode"\n[[modal]]\nmass = "1 kg"\nfrequency = "7 Hz"\ndamping_ratio = 0.01\ngauge_gain = "1 N/m"\n')
     unrig("diagnose", "--rig", mode, *(damped_decay(out / f"{name}.csv", start) for name, start in (("large", 1.0), ("small", -0.4))), "-o", out / "diagnosis_law.json", status=(0, 1))
