@@ -5,6 +5,7 @@
 #include <cmath>
 #include <filesystem>
 #include <map>
+#include <numbers>
 
 #include "tests/correct/null_campaign.h"
 
@@ -71,6 +72,18 @@ TEST(LeftByFit, IsInTheBandOfSteppingInAWave) {
   EXPECT_GT(without.largest, 4);
   EXPECT_LT(with.largest, 3);
   EXPECT_TRUE(with.told);
+}
+
+/// What is left of wide swings may be more than all of a step's load. Whether an unexplained step has an answer is for its own readings to say.
+TEST(LeftByFit, DoesNotDecideWhetherThereIsAnAnswer) {
+  CorrectProblem problem = test::null_problem("step_a");
+  Channel& gauge = *std::find_if(problem.run.channels.begin(), problem.run.channels.end(), [](const Channel& c) { return c.name == "gauge"; });
+  for (Index k = 0; k < gauge.value.size(); ++k) gauge.value[k] += 0.1 * std::sin(2 * std::numbers::pi * 1.7 * static_cast<double>(k) * problem.run.dt);  // N
+  problem.fit.left = {{"dry_pluck.csv", "gauge", false, {0.3, VectorXd::Constant(10, 30.0)}}};
+  const CorrectResult result = correct(problem);
+  EXPECT_GT(result.reduced_chi2, 2);
+  EXPECT_GT(result.circulatory.std.tail(100).mean(), std::abs(result.circulatory.value.tail(1)[0] - result.circulatory.value[0]));
+  EXPECT_EQ(result.no_answer, "");
 }
 
 /// A load that builds up otherwise than the fit has it is an answer and no disturbance.
