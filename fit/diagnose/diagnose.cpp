@@ -82,7 +82,7 @@ bool has_colour(const JointProblem& joint) {
 
 /// Both fits in full, and what they leave of the fitted runs. Of an explanation with the rig's description put right `d.after` is the fit with its laws to the rig as the files have it: no fit is told that
 /// belongs to a rig in no file.
-void describe(const FitProblem& fit_problem, const Trial& baseline, Explanation& e, Diagnosis& d) {
+void describe(const FitProblem& fit_problem, const Trial& baseline, FoundSet& e, Diagnosis& d) {
   const Trial& best = e.best;
   const bool described = e.setting.problem != &fit_problem;
   const auto settled = [](const Trial& trial) { return trial.reduced_chi2() < twice_the_noise ? Settle::noise : Settle::nothing; };
@@ -130,7 +130,7 @@ double probability_of(const std::string& id, const std::vector<Candidate>& ranki
 }
 
 /// The effects of the best set, with their parameters.
-std::vector<MissingEffect> effects_of(const Explanation& found, const Rig& rig, const Diagnosis& d) {
+std::vector<MissingEffect> effects_of(const FoundSet& found, const Rig& rig, const Diagnosis& d) {
   const Trial& best = found.best;
   std::vector<MissingEffect> set;
   for (const std::string& id : best.effects) {
@@ -146,7 +146,7 @@ std::vector<MissingEffect> effects_of(const Explanation& found, const Rig& rig, 
 }
 
 /// The sets of `tried` that are as good as the best, each once, in whatever order its effects were found.
-void name_equivalent(const Explanation& found, bool described, const std::vector<Trial>& tried, bool verdict_only, Diagnosis& d) {
+void name_equivalent(const FoundSet& found, bool described, const std::vector<Trial>& tried, bool verdict_only, Diagnosis& d) {
   const Trial& best = found.best;
   const auto set_of = [](const Trial& t) { return std::set<std::string>(t.effects.begin(), t.effects.end()); };
   std::set<std::set<std::string>> named;
@@ -252,7 +252,7 @@ Diagnosis diagnose_inexact(const DiagnoseProblem& problem) {
 }
 
 /// The candidate among all others, in words and with what it does to the load.
-MissingEffect missing_description(const RigDescription& description, const Explanation& found, const FitProblem& fit_problem, const Diagnosis& d) {
+MissingEffect missing_description(const RigDescription& description, const FoundSet& found, const FitProblem& fit_problem, const Diagnosis& d) {
   MissingEffect m = description.as_missing();
   m.probability = probability_of(m.effect, d.ranking);
   if (const double change = found.fit.parameters.empty() ? 0 : change_of_load(fit_problem, d.before, *description.problem, found.fit); change != 0)
@@ -261,13 +261,13 @@ MissingEffect missing_description(const RigDescription& description, const Expla
 }
 
 /// Laws beside the rig's description put right; what was tried is added to the ranking of `selection`.
-Explanation laws_beside(const RigDescription& description, const DiagnoseProblem& problem, const Setting& files, const Trial& baseline, Selection& selection) {
+FoundSet laws_beside(const RigDescription& description, const DiagnoseProblem& problem, const FoundIn& files, const Trial& baseline, Selection& selection) {
   DiagnoseProblem there = problem;
   there.rig = description.problem->rig;
   Selection beside(there, *description.problem, description.trial);
   Trial best = beside.best_set();
   if (beside.stopped()) throw OutOfTime{};
-  Explanation with = look_at(problem, files, baseline, {description.problem.get(), &description.heldout}, std::move(best), description.cost);
+  FoundSet with = look_at(problem, files, baseline, {description.problem.get(), &description.heldout}, std::move(best), description.cost);
   for (Candidate c : beside.ranking()) {
     if (c.effects.empty()) continue;
     c.effects.insert(c.effects.begin(), rig_description_id);
@@ -278,11 +278,11 @@ Explanation laws_beside(const RigDescription& description, const DiagnoseProblem
 }
 
 /// The rig's description against the laws that were `found`: with laws `beside` it, as far as these were looked for, where neither explains everything. True where it is the better explanation, then in `found`.
-bool weigh(const DiagnoseProblem& problem, const Setting& files, const Trial& baseline, const RigDescription& description, std::optional<Explanation> beside, Selection& selection, SearchTime& time, Explanation& found) {
+bool weigh(const DiagnoseProblem& problem, const FoundIn& files, const Trial& baseline, const RigDescription& description, std::optional<FoundSet> beside, Selection& selection, SearchTime& time, FoundSet& found) {
   const double against_baseline = bic_difference(description.trial, baseline) + description.cost;
   selection.add({{rig_description_id}, description.trial.reduced_chi2(), against_baseline, 0, description.promised});
   if (found.explains() && against_baseline > -decisive) return false;
-  Explanation with = beside ? std::move(*beside) : look_at(problem, files, baseline, {description.problem.get(), &description.heldout}, description.trial, description.cost);
+  FoundSet with = beside ? std::move(*beside) : look_at(problem, files, baseline, {description.problem.get(), &description.heldout}, description.trial, description.cost);
   if (!with.explains() && !found.explains() && !beside) time.spend([&] { with = laws_beside(description, problem, files, baseline, selection); });
   const bool laws_named = !found.best.effects.empty() && naming_of(found.best, baseline, found.clean(), found.predicts) == Naming::named;
   if (!with.explains() || (laws_named && bic_difference(found.best, with.best) - with.cost < -decisive)) return false;
@@ -301,7 +301,7 @@ bool leaves_something(const Trial& t) { return what_remains(t).found; }
 /// The law of what no effect explains: beside nothing, since an effect of the list may stand in for it, and beside the best set. A law that is on the list goes by its id: an effect of the list comes first where
 /// no form is decisively better. What leaves nothing comes before the rest: of sets that set decays aside the evidence is that of the other runs. Where the first is named, leaves nothing or is no worse than any
 /// set that was tried, and is decisively better than what was `found`, it is in `found`.
-std::optional<Laws> look_for_laws(const DiagnoseProblem& problem, FitProblem& fit_problem, const Setting& files, const Trial& baseline, Selection& selection, Explanation& found) {
+std::optional<Laws> look_for_laws(const DiagnoseProblem& problem, FitProblem& fit_problem, const FoundIn& files, const Trial& baseline, Selection& selection, FoundSet& found) {
   Laws laws;
   const auto look_beside = [&](const Trial& base) {
     LawSearch search(fit_problem, base, leaves_something);
@@ -321,7 +321,7 @@ std::optional<Laws> look_for_laws(const DiagnoseProblem& problem, FitProblem& fi
   const auto listed = std::find_if(laws.tried.begin(), last, [](const Trial& t) { return !is_law_id(t.effects.back()); });
   if (listed != last && bic_difference(*listed, laws.tried.front()) < decisive) std::rotate(laws.tried.begin(), listed, listed + 1);
   fit_problem.rig.laws = laws.tried.front().arrival.joint.model().rig().laws;
-  Explanation with = look_at(problem, files, baseline, files, laws.tried.front(), 0);
+  FoundSet with = look_at(problem, files, baseline, files, laws.tried.front(), 0);
   const bool holds = with.clean() || bic_difference(with.best, baseline) < selection.ranking().front().delta_bic + decisive;
   if (naming_of(with.best, baseline, with.clean(), with.predicts) != Naming::named || !holds || !(bic_difference(with.best, found.best) < -decisive)) {
     fit_problem.rig.laws.clear();
@@ -332,7 +332,7 @@ std::optional<Laws> look_for_laws(const DiagnoseProblem& problem, FitProblem& fi
 }
 
 /// Laws among `set`, told as such; the rig keeps only those at work.
-void tell_laws(FitProblem& fit_problem, const Laws& laws, const Explanation& found, std::vector<MissingEffect>& set, Diagnosis& d) {
+void tell_laws(FitProblem& fit_problem, const Laws& laws, const FoundSet& found, std::vector<MissingEffect>& set, Diagnosis& d) {
   const std::vector<Rival> others = rivals(laws.tried, leaves_something, decisive);
   for (MissingEffect& m : set)
     if (is_law_id(m.effect)) {
@@ -371,10 +371,10 @@ Diagnosis diagnose_in_order(const DiagnoseProblem& problem, bool numbers_known) 
   std::optional<RigDescription> description;
   if (d.mismatch.found && !numbers_known) time.spend([&] { description = describe_rig(problem, baseline); });
   // What a set leaves may be noise that is not white, in which all is to be held against each other anew, or the rig's description.
-  const Setting files{&fit_problem, &problem.heldout};
+  const FoundIn files{&fit_problem, &problem.heldout};
   auto selection = std::make_unique<Selection>(problem, fit_problem, baseline);
   bool anew = false, asked = numbers_known;
-  std::optional<Explanation> beside;  // the rig's description and laws
+  std::optional<FoundSet> beside;  // the rig's description and laws
   const auto noise_or_rig = [&](const Trial& set) {
     if (Trial there = set; !coloured && explained_by_noise(there)) {
       Trial in_its_noise = baseline;
@@ -386,7 +386,7 @@ Diagnosis diagnose_in_order(const DiagnoseProblem& problem, bool numbers_known) 
     std::optional<RigDescription> rig = describe_rig(problem, set, enough_to_name);
     if (!rig || rig->left > explained) return false;
     asked = true;
-    Explanation with = laws_beside(*rig, problem, files, baseline, *selection);
+    FoundSet with = laws_beside(*rig, problem, files, baseline, *selection);
     if (!with.explains()) return false;
     description = std::move(rig);
     with.setting = {description->problem.get(), &description->heldout};
@@ -403,7 +403,7 @@ Diagnosis diagnose_in_order(const DiagnoseProblem& problem, bool numbers_known) 
     time.spend([&] { best_set = selection->best_set(noise_or_rig); });
   }
   if (!problem.verdict_only) d.maps = residual_maps(baseline.arrival.joint, d.mismatch.runs);
-  Explanation found = look_at(problem, files, baseline, files, std::move(best_set), 0);
+  FoundSet found = look_at(problem, files, baseline, files, std::move(best_set), 0);
   const bool described = description && weigh(problem, files, baseline, *description, std::move(beside), *selection, time, found);
   std::optional<Laws> laws;
   if (problem.laws && !problem.verdict_only && problem.effects.empty() && d.mismatch.found && !described && !found.explains())
