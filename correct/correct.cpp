@@ -12,7 +12,6 @@
 #include <fmt/ranges.h>
 
 #include "core/effects/effect.h"
-#include "core/files/text_file.h"
 #include "core/numerics/in_parallel.h"
 #include "core/model/indicial_table.h"
 #include "core/law/law_effect.h"
@@ -20,10 +19,10 @@
 #include "core/model/run_inputs.h"
 #include "core/run/run_limits.h"
 #include "correct/estimate/how_far_to_trust.h"
+#include "correct/segments/beyond_noise.h"
 #include "correct/segments/inexact_load.h"
 #include "correct/segments/knots.h"
 #include "correct/segments/load_in_legs.h"
-#include "correct/estimate/misfit.h"
 #include "correct/estimate/noise_choice.h"
 #include "correct/estimate/prior.h"
 #include "correct/long_motion/restless_correction.h"
@@ -32,7 +31,6 @@
 #include "fit/likelihood/explained.h"
 #include "fit/likelihood/run_residual.h"
 #include "fit/likelihood/share_followed.h"
-#include "fit/uncertainty/coloured_noise.h"
 
 namespace unrig {
 namespace {
@@ -149,54 +147,6 @@ MatrixXd interpolated(const MatrixXd& value, const std::vector<Index>& at, Index
       all.row(k) = (1 - share) * value.row(j) + share * value.row(j + 1);
     }
   return all;
-}
-
-/// Whether what the fit left of one run may be in another one's readings too: of a run without a stream always, of one with a stream where something remains of the other run as well. Else a load that builds
-/// up in another way than the fit's would count, which is what is estimated.
-bool tells_of_others(const LeftByFit& left, bool remains) { return !left.in_stream || remains; }
-
-/// Density of what the fit left of such runs: the mean of those without a stream, or of those with one, whichever is larger at this frequency.
-double left_by_fit(const std::vector<LeftByFit>& left, bool remains, const std::string& channel, double frequency) {
-  double sum[2] = {0, 0}, count[2] = {0, 0};
-  for (const LeftByFit& one : left) {
-    if (one.channel != channel || !tells_of_others(one, remains)) continue;
-    sum[one.in_stream] += one.power.at(frequency);
-    ++count[one.in_stream];
-  }
-  return std::max(sum[0] / std::max(1.0, count[0]), sum[1] / std::max(1.0, count[1]));
-}
-
-/// What moves the answers of a run beyond the noise of its readings.
-struct BeyondNoise {
-  double own = 1;                      ///< how much more what the run is left with moves the circulatory load than noise of its size would; at least 1
-  MatrixXd of_fit;                     ///< what the fit left of its runs' readings, on (theta, c) of this one (disturbance_root); empty: nothing
-  std::set<std::string> unexplained;   ///< those runs
-};
-
-/// Whether what is left of a run at rest is not white, at the level of the fit's standard errors.
-bool is_coloured(const RunResidual& residual, const RunResidual::Sensitivity& sensitivity) {
-  constexpr double significant = 0.01;
-  std::vector<VectorXd> at_rest;
-  for (const auto& channel : sensitivity.channels) at_rest.push_back(residual_at_rest(channel.residual, residual.motion().phases(), residual.linear_unknowns()));
-  return whiteness(at_rest) < significant;
-}
-
-BeyondNoise moved_beyond_noise(const RunResidual& residual, const RunResidual::Evaluation& e, const Prior& prior, const VectorXd& theta, double reduced_chi2, const FittedRig& fit) {
-  const bool explained = reduced_chi2 <= most_of_noise(residual.degrees_of_freedom());
-  BeyondNoise beyond;
-  if (!std::isfinite(reduced_chi2) || (explained && fit.left.empty())) return beyond;
-  const RunResidual::Sensitivity sensitivity = residual.sensitivity(theta);
-  const MatrixXd root = theta_root(e, prior);
-  const bool remains = !explained || is_coloured(residual, sensitivity);
-  for (const LeftByFit& one : fit.left)
-    if (tells_of_others(one, remains)) beyond.unexplained.insert(base_name(one.run));
-  if (!beyond.unexplained.empty()) beyond.of_fit = disturbance_root(residual, sensitivity, e, root, [&](const std::string& channel, double frequency) { return left_by_fit(fit.left, remains, channel, frequency); });
-  if (explained) return beyond;
-  const RigidLoad load = load_at(residual, theta, e.linear, chosen_samples(residual.motion()), {});
-  MatrixXd by_theta = load.circulatory_by_theta + load.circulatory_by_motion * e.linear_slope.topRows(load.circulatory_by_motion.cols());
-  by_theta.rowwise() += steady_per_reading(residual.model().rig()) * e.linear_slope.row(residual.first_offset());
-  beyond.own = std::max(1.0, misfit_over_noise(sensitivity, root, by_theta, reduced_chi2));
-  return beyond;
 }
 
 /// Where the rigid rig goes on from behind a leg, with its motion following theta.
@@ -324,6 +274,11 @@ std::string fit_leaves(const CorrectProblem& problem, const std::set<std::string
                      fmt::join(runs, ", "));
 }
 
+std::string fit_leaves_unheeded(const CorrectProblem& problem) {
+  return fmt::format("{}: {} does not explain all of its runs. The band of a run that is followed in parts or without a rest does not allow for what it leaves of them. `unrig diagnose` looks for what is missing.",
+                     problem.run.file, problem.fit.file);
+}
+
 /// Samples behind the onset.
 Index first_behind_onset(const CorrectResult& result) { return std::clamp<Index>(static_cast<Index>((result.onset - result.start) / result.dt), 0, result.gauge.size() - 1); }
 
@@ -444,6 +399,7 @@ CorrectResult correct_at(const CorrectProblem& problem, const FittedNumbers* num
   if (windows_by_leg.empty()) {
     correct_restless({model, run, prior, start, length, steady_per_reading(problem.rig), problem.imposed}, result);
     if (numbers) result.warnings.push_back(fmt::format("{}: the shaft hardly ever rests; the band of such a run does not allow for the uncertainties that rig file and run state.", run.file));
+    if (!problem.fit.left.empty()) result.warnings.push_back(fit_leaves_unheeded(problem));
     look_at_what_is_left(run, 2 * run.samples(), 1, band_over_change(result), result);
     return result;
   }
@@ -472,7 +428,7 @@ CorrectResult correct_at(const CorrectProblem& problem, const FittedNumbers* num
     result.indicial = indicial_response(model, free.solution.theta, budget_of(0, free.prior, result.calibration_uncertainty), length, result.semichords_per_second);
   }
   look_at(best);
-  if (legs.size() == 1) beyond_noise = moved_beyond_noise(legs.residual(0), together.all, best.prior, theta, result.reduced_chi2, problem.fit);
+  if (legs.size() == 1) beyond_noise = moved_beyond_noise(legs.residual(0), together.all, best.prior, theta, result.reduced_chi2, problem.fit, chosen_samples(legs.residual(0).motion()));
   const UncertaintyBudget of_theta = budget_of(0, best.prior, result.calibration_uncertainty);
   const std::vector<RunResidual::Evaluation>& by_leg = legs.by_leg(best.solution);
 
@@ -500,6 +456,7 @@ CorrectResult correct_at(const CorrectProblem& problem, const FittedNumbers* num
   result.amplitudes = static_cast<Index>(best.prior.amplitudes.size());
   result.in_fit = !best.prior.held.empty();
   if (numbers) add_numbers({legs, model, best, *numbers, result.indicial.semichords}, result);
+  if (in_legs && !problem.fit.left.empty()) result.warnings.push_back(fit_leaves_unheeded(problem));
   if (!beyond_noise.unexplained.empty()) result.warnings.push_back(fit_leaves(problem, beyond_noise.unexplained));
   look_at_what_is_left(run, legs.degrees_of_freedom(), beyond_noise.own, own_band, result);
   return result;

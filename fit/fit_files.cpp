@@ -94,12 +94,6 @@ std::vector<ChannelColour> read_noise_colour(const json& in) {
   return all;
 }
 
-json numbers(const Eigen::VectorXd& x) {
-  json list = json::array();
-  for (const double value : x) list.push_back(number(value));
-  return list;
-}
-
 /// What the fit left of a run.
 void read_left(const json& run, FittedRig& fit) {
   for (const json& channel : run.value("channels", json::array())) {
@@ -238,7 +232,7 @@ std::string to_json(const FitResult& r, const std::vector<std::shared_ptr<const 
     for (const FittedChannel& c : run.channels) {
       channels.push_back({{"name", c.name}, {"unit", c.unit}, {"samples", c.samples}, {"missing", c.missing}, {"spikes", c.spikes + static_cast<Eigen::Index>(c.bad)}, {"clipped", c.clipped},
                           {"rms_residual", number(c.rms_residual)}, {"noise", number(c.noise)}});
-      if (c.left.density.size() > 0) channels.back()["left"] = {{"from", c.left.from}, {"unit", "Hz"}, {"density", numbers(c.left.density)}};
+      if (c.left.density.size() > 0) channels.back()["left"] = {{"from", c.left.from}, {"unit", "Hz"}, {"density", std::vector<double>(c.left.density.begin(), c.left.density.end())}};
     }
     const FittedChannel& first = run.channels.front();
     out["runs"].push_back({{"file", run.file}, {"fingerprint", run.fingerprint}, {"onset_angle", number(run.onset_angle)}, {"in_stream", run.in_stream}, {"samples", run.samples}, {"rms_residual", number(first.rms_residual)}, {"noise", number(first.noise)},

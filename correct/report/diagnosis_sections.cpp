@@ -10,6 +10,7 @@
 #include "correct/report/fit_traces.h"
 #include "correct/report/result_files.h"
 #include "correct/report/rig_sections.h"
+#include "fit/diagnose/diagnosis_files.h"
 #include "fit/fit_json.h"
 
 namespace unrig {
@@ -368,7 +369,7 @@ void add_diagnosis(ReportPage& page, const json& result, const std::string& path
   add_missing(page, result["missing"], "Parameters of what was missing");
   add_closest(page, member(result, "closest", json::object()));
   if (const std::string search = text_of(result, "search_summary"); !search.empty()) page.add_text("Warning: " + search);
-  if (result.value("stopped", false)) page.add_text("Warning: the search ended with its limit of time, not by itself: what was not tried may explain more.");
+  if (result.value("stopped", false)) page.add_text(std::string("Warning: ") + stopped_words);
   page.add_heading("Before and after");
   add_improvement(page, improvement);
   page.add_heading("What it does to the load");

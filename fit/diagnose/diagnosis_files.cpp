@@ -97,8 +97,6 @@ std::string search_words(const Diagnosis& d) {
   return text + "Unexplained is what the search left, not what all effects leave. Look at rig file and runs, diagnose fewer runs, or name candidates with --effects.";
 }
 
-constexpr const char* stopped_words = "The search ended with its limit of time, not by itself: what was not tried may explain more. Give it more (--limit), or name candidates with --effects.";
-
 bool is_rig_description(const MissingEffect& m) { return m.effect == rig_description_id; }
 
 /// "normal.mass[13] = 0.871 +/- 0.004 kg where the rig file says 0.86".

@@ -20,8 +20,9 @@ double LeftInOctaves::at(double frequency) const {
 LeftInOctaves left_in_octaves(const VectorXd& residual, const VectorXd& weight, double dt, double noise) {
   constexpr Index fewest = 8;
   const Index samples = residual.size(), counted = (weight.array() > 0).count();
-  if (counted < fewest) return {};
-  const VectorXd power = 2 * dt / static_cast<double>(counted) * fourier((weight.array() > 0).select(residual, 0)).cwiseAbs2();
+  const VectorXd there = (weight.array() > 0).select(residual, 0);
+  if (counted < fewest || !there.allFinite()) return {};
+  const VectorXd power = 2 * dt / static_cast<double>(counted) * fourier(there).cwiseAbs2();
   std::vector<double> density;
   for (Index first = 1; first < power.size(); first *= 2) {
     const Index lines = std::min(2 * first, power.size()) - first;

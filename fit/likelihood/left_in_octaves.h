@@ -14,7 +14,8 @@ struct LeftInOctaves {
   double at(double frequency) const;
 };
 
-/// Of a residual `dt` [s] apart whose white noise has the standard deviation `noise`; samples with no `weight` have no residual. No octaves where fewer than 8 count.
+/// Of a residual `dt` [s] apart whose white noise has the standard deviation `noise`; samples with no `weight` have no residual. No octaves where fewer than 8 count, or one is not finite
+/// (a model that runs away).
 ///
 ///   S_b = max(0, mean over the octave of 2 dt |F_k|^2 / m - 2 dt noise^2),   F the transform with 0 where nothing is left, m the samples that count.
 ///

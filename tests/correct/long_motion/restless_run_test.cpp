@@ -189,6 +189,12 @@ TEST(Restless, LoadIsFoundInTimeThatGoesWithTheRecord) {
   }
 }
 
+TEST(Restless, ItsBandDoesNotAllowForWhatTheFitLeftAndSaysSo) {
+  FittedRig fit = test::null_fit();
+  fit.left = {{"dry_pluck.csv", "gauge", false, {0.3, VectorXd::Ones(8)}}};
+  EXPECT_THAT(correct({test::null_rig(), fit, record(&sine, 10000).run, 0}).warnings, testing::Contains(testing::HasSubstr("does not allow for what it leaves of them")));
+}
+
 /// Long enough for a search that begins on a part of the record and for several pieces.
 TEST(Restless, ALongRecordIsFoundPieceByPiece) {
   for (double (*const motion)(double) : {&many_frequencies, &chirp}) {

@@ -176,6 +176,12 @@ TEST(RunInLegs, ACalibrationErrorScalesTheLoad) {
   EXPECT_GT(rms(predicted), 0.005 * rms(result.circulatory.value));
 }
 
+TEST(RunInLegs, SayThatTheirBandDoesNotAllowForWhatTheFitLeft) {
+  FittedRig fit = test::null_fit();
+  fit.left = {{"dry_pluck.csv", "gauge", false, {0.3, VectorXd::Ones(8)}}};
+  EXPECT_THAT(correct({test::null_rig(), fit, record(&ten_steps, 10000).run, 0}).warnings, Contains(HasSubstr("does not allow for what it leaves of them")));
+}
+
 TEST(Knots, LegsAreNotCutWhereNothingIsRead) {
   const Windows windows{{{100, 250}, 2}, {{500, 650}, 2}, {{900, 1050}, 2}};
   const auto legs_without = [&](Eigen::Index first, Eigen::Index last) { return legs_of(windows, 100, [&](const Interval& i) { return i.last <= first || i.first >= last; }); };

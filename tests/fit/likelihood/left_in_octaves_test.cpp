@@ -70,6 +70,12 @@ TEST(LeftInOctaves, HasNoOctavesOfAHandfulOfReadings) {
   EXPECT_EQ(LeftInOctaves{}.at(3), 0);
 }
 
+TEST(LeftInOctaves, HasNoneOfAModelThatRunsAway) {
+  VectorXd x = white(100, 1);
+  x[50] = INFINITY;
+  EXPECT_EQ(left_in_octaves(x, VectorXd::Ones(100), dt, noise).density.size(), 0);
+}
+
 TEST(LeftInOctaves, GoesOnBelowAndAboveItsOctaves) {
   const LeftInOctaves left{0.5, VectorXd::LinSpaced(3, 1, 3)};
   for (const auto& [frequency, density] : {std::pair{0.0, 1.0}, {0.99, 1.0}, {1.0, 2.0}, {1.99, 2.0}, {2.0, 3.0}, {100.0, 3.0}}) EXPECT_EQ(left.at(frequency), density) << frequency;
