@@ -261,7 +261,7 @@ MissingEffect missing_description(const RigDescription& description, const Found
 }
 
 /// Laws beside the rig's description put right; what was tried is added to the ranking of `selection`.
-FoundSet laws_beside(const RigDescription& description, const DiagnoseProblem& problem, const FoundIn& files, const Trial& baseline, Selection& selection) {
+FoundSet laws_beside(const RigDescription& description, const DiagnoseProblem& problem, const Setting& files, const Trial& baseline, Selection& selection) {
   DiagnoseProblem there = problem;
   there.rig = description.problem->rig;
   Selection beside(there, *description.problem, description.trial);
@@ -278,7 +278,7 @@ FoundSet laws_beside(const RigDescription& description, const DiagnoseProblem& p
 }
 
 /// The rig's description against the laws that were `found`: with laws `beside` it, as far as these were looked for, where neither explains everything. True where it is the better explanation, then in `found`.
-bool weigh(const DiagnoseProblem& problem, const FoundIn& files, const Trial& baseline, const RigDescription& description, std::optional<FoundSet> beside, Selection& selection, SearchTime& time, FoundSet& found) {
+bool weigh(const DiagnoseProblem& problem, const Setting& files, const Trial& baseline, const RigDescription& description, std::optional<FoundSet> beside, Selection& selection, SearchTime& time, FoundSet& found) {
   const double against_baseline = bic_difference(description.trial, baseline) + description.cost;
   selection.add({{rig_description_id}, description.trial.reduced_chi2(), against_baseline, 0, description.promised});
   if (found.explains() && against_baseline > -decisive) return false;
@@ -301,7 +301,7 @@ bool leaves_something(const Trial& t) { return what_remains(t).found; }
 /// The law of what no effect explains: beside nothing, since an effect of the list may stand in for it, and beside the best set. A law that is on the list goes by its id: an effect of the list comes first where
 /// no form is decisively better. What leaves nothing comes before the rest: of sets that set decays aside the evidence is that of the other runs. Where the first is named, leaves nothing or is no worse than any
 /// set that was tried, and is decisively better than what was `found`, it is in `found`.
-std::optional<Laws> look_for_laws(const DiagnoseProblem& problem, FitProblem& fit_problem, const FoundIn& files, const Trial& baseline, Selection& selection, FoundSet& found) {
+std::optional<Laws> look_for_laws(const DiagnoseProblem& problem, FitProblem& fit_problem, const Setting& files, const Trial& baseline, Selection& selection, FoundSet& found) {
   Laws laws;
   const auto look_beside = [&](const Trial& base) {
     LawSearch search(fit_problem, base, leaves_something);
@@ -371,7 +371,7 @@ Diagnosis diagnose_in_order(const DiagnoseProblem& problem, bool numbers_known) 
   std::optional<RigDescription> description;
   if (d.mismatch.found && !numbers_known) time.spend([&] { description = describe_rig(problem, baseline); });
   // What a set leaves may be noise that is not white, in which all is to be held against each other anew, or the rig's description.
-  const FoundIn files{&fit_problem, &problem.heldout};
+  const Setting files{&fit_problem, &problem.heldout};
   auto selection = std::make_unique<Selection>(problem, fit_problem, baseline);
   bool anew = false, asked = numbers_known;
   std::optional<FoundSet> beside;  // the rig's description and laws
@@ -408,7 +408,7 @@ Diagnosis diagnose_in_order(const DiagnoseProblem& problem, bool numbers_known) 
   std::optional<Laws> laws;
   if (problem.laws && !problem.verdict_only && problem.effects.empty() && d.mismatch.found && !described && !found.explains())
     time.spend([&] { laws = look_for_laws(problem, fit_problem, files, baseline, *selection, found); });
-  if (!laws) fit_problem.rig.laws.clear();
+  if (time.is_up() && !laws) fit_problem.rig.laws.clear();  // a search that was stopped leaves its forms there
   const Trial& best = found.best;
   d.ranking = selection->ranking();
   d.remaining = found.remaining;

@@ -22,7 +22,7 @@ bool follows_decays(const Trial& trial, const Trial& baseline) {
 }
 
 /// What runs that were not fitted are left with, before and after. `best` is of the rig and the runs of `after`.
-std::vector<ImprovedRun> predict_unseen(const FoundIn& before, const Arrival& baseline, const FoundIn& after, const Trial& best) {
+std::vector<ImprovedRun> predict_unseen(const Setting& before, const Arrival& baseline, const Setting& after, const Trial& best) {
   FitProblem after_problem = *after.problem;
   after_problem.effects = best.effects;
   const std::vector<Run>& runs = before.problem->runs;
@@ -52,7 +52,7 @@ double power_over_noise(const std::vector<ImprovedRun>& runs, double ImprovedRun
 }
 
 /// How much more than before, as a share, runs that were not fitted may be left with: nothing where an effect acts in one of them. Where none does, what chi-square of so many samples scatters by.
-double tolerated(const FoundIn& files, const std::vector<std::string>& effects) {
+double tolerated(const Setting& files, const std::vector<std::string>& effects) {
   if (effects.empty()) return 0;
   const FitProblem& problem = *files.problem;
   double samples = 0;
@@ -74,7 +74,7 @@ Naming naming_of(const Trial& best, const Trial& baseline, bool clean, bool pred
   return only_signals ? Naming::only_signals : Naming::named;
 }
 
-FoundSet look_at(const DiagnoseProblem& problem, const FoundIn& files, const Trial& baseline, const FoundIn& setting, Trial best, double cost) {
+FoundSet look_at(const DiagnoseProblem& problem, const Setting& files, const Trial& baseline, const Setting& setting, Trial best, double cost) {
   FoundSet e{setting, std::move(best), cost, {}, {}, false};
   e.remaining = what_remains(e.best);
   if (!problem.verdict_only) e.unseen = predict_unseen(files, baseline.arrival, setting, e.best);

@@ -8,14 +8,14 @@
 namespace unrig {
 
 /// A rig and its runs: as the files have them, or as their description was put right.
-struct FoundIn {
+struct Setting {
   const FitProblem* problem;
   const std::vector<Run>* heldout;
 };
 
 /// The best set of laws in a setting, and what is to be said of it.
 struct FoundSet {
-  FoundIn setting;
+  Setting setting;
   Trial best;
   double cost = 0;  ///< of the setting, as a difference of BIC
   Mismatch remaining;
@@ -32,6 +32,6 @@ Naming naming_of(const Trial& best, const Trial& baseline, bool clean, bool pred
 
 /// What remains beside `best`, a set in `setting`, and whether it predicts runs that were not fitted no worse than the fit with nothing missing to the rig as the `files` have it: those held out or, where there are
 /// none, each fitted run from the others.
-FoundSet look_at(const DiagnoseProblem& problem, const FoundIn& files, const Trial& baseline, const FoundIn& setting, Trial best, double cost);
+FoundSet look_at(const DiagnoseProblem& problem, const Setting& files, const Trial& baseline, const Setting& setting, Trial best, double cost);
 
 }  // namespace unrig

@@ -7,6 +7,7 @@
 #include <map>
 #include <numbers>
 
+#include "core/files/error.h"
 #include "tests/correct/null_campaign.h"
 
 namespace unrig {
@@ -97,7 +98,27 @@ TEST(LeftByFit, DoesNotWidenWhatTheStepsThemselvesExplain) {
   EXPECT_EQ(same.warnings, plain.warnings);
 }
 
-TEST(LeftByFit, OfAnEarlierVersionIsNone) { EXPECT_TRUE(test::null_fit().left.empty()); }
+TEST(LeftByFit, IsNothingOfRunsThatAreExplained) { EXPECT_TRUE(test::null_fit().left.empty()); }
+
+FittedRig fit_with(const std::string& channel) {
+  const test::TemporaryDirectory directory;
+  return read_fit(directory.file("fit.json", R"({"unrig": "fit", "parameters": [], "runs": [{"file": "a.csv", "in_stream": true, "channels": [{"name": "gauge"}, {"name": "tip", )" + channel + "}]}]}"));
+}
+
+TEST(LeftByFit, IsReadAsItIsWritten) {
+  const FittedRig fit = fit_with(R"("left": {"from": 0.25, "unit": "Hz", "density": [1, 0, 3]})");
+  ASSERT_EQ(fit.left.size(), 1u);
+  EXPECT_EQ(fit.left[0].run, "a.csv");
+  EXPECT_EQ(fit.left[0].channel, "tip");
+  EXPECT_TRUE(fit.left[0].in_stream);
+  EXPECT_EQ(fit.left[0].power.from, 0.25);
+  EXPECT_EQ(fit.left[0].power.density, VectorXd({{1, 0, 3}}));
+  EXPECT_TRUE(fit_with(R"("unit": "m")").left.empty());  // as an earlier version wrote it
+}
+
+TEST(LeftByFit, IsRefusedWhereItIsNoPower) {
+  for (const std::string left : {R"({"from": 0, "density": [1]})", R"({"from": 0.25, "density": [1, -1]})", R"({"from": 0.25, "density": [null]})", R"({"density": [1]})"}) EXPECT_THROW(fit_with("\"left\": " + left), InputError) << left;
+}
 
 }  // namespace
 }  // namespace unrig

@@ -9,6 +9,7 @@
 #include <numbers>
 #include <random>
 
+#include "core/numerics/spectrum.h"
 #include "core/propagate/response.h"
 
 namespace unrig {
@@ -79,6 +80,23 @@ TEST(WhiteningFilter, SaysWhatTheWholeCovarianceSays) {
 TEST(WhiteningFilter, LeavesAConstantAlone) {
   const WhiteningFilter filter(three_parts(), dt);
   EXPECT_LT((filter.filtered(VectorXd::Constant(50, 2.5)).array() - 2.5).abs().maxCoeff(), 1e-10);
+}
+
+TEST(NoiseColour, ItsDensityIsTheMeanPeriodogramAndHoldsTheVariance) {
+  const NoiseColour colour = three_parts();
+  constexpr Index lines = 1 << 17;  // spaced by a hundredth of the lowest corner
+  const double spacing = 0.5 / dt / lines;
+  double sum = 0;
+  for (Index k = 0; k < lines; ++k) sum += colour.density((static_cast<double>(k) + 0.5) * spacing, dt) * spacing;
+  EXPECT_NEAR(sum, colour.variance(), 1e-6);
+  constexpr Index samples = 4096;
+  const int records = 400;
+  VectorXd power = VectorXd::Zero(samples / 2 + 1);
+  for (unsigned seed = 1; seed <= records; ++seed) power += 2 * dt / static_cast<double>(samples) * fourier(noise_of(colour, samples, seed)).cwiseAbs2() / records;
+  for (const Index k : {100, 300, 1000, 2000}) {  // far from the lowest line, where an end of the record leaks; 11 lines of 400 records: 1.5 %
+    const double mean = power.segment(k - 5, 11).mean();
+    EXPECT_NEAR(mean / colour.density(static_cast<double>(k) / (samples * dt), dt), 1, 0.06) << k;
+  }
 }
 
 /// White noise is called coloured once in a thousand, and the likelihood of powers that may not be negative is less than the threshold's chi-square.
