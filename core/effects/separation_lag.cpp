@@ -1,25 +1,22 @@
-#include <cmath>
-#include <numbers>
-
 #include "core/effects/list.h"
 
 namespace unrig {
 
 namespace {
 
-constexpr double onset = 8 * std::numbers::pi / 180;  // below it the flow of a usual section stays attached
-constexpr const char* steps = "Record a step of the angle from more than 8 degrees, and let it run for some hundred semichords.";
+constexpr const char* steps = "Record a step of the angle and let it run for some hundred semichords.";
 
 }  // namespace
 
-/// Slow loss of lift after a change of the angle at high incidence, while the separation point moves forward along the suction side: of the circulatory force on a strip the
+/// Slow loss of lift after a change of the angle, while the separation point moves forward along the suction side: of the circulatory force on a strip the
 /// share D of what the downwash w would give in the end is lost with the time constant T_s in semichords, N -= s rho U b l D y, y' = (U / b T_s) (w - y), so that
-/// phi(s) -> phi(s) - D (1 - exp(-s/T_s)). D and T_s are shared by the runs at more than 8 degrees.
+/// phi(s) -> phi(s) - D (1 - exp(-s/T_s)). D and T_s are shared by all runs in a stream:
+/// where separation begins hangs on section and Reynolds number (a flat plate's with its leading edge at any angle), so that no angle bars it.
 /// Source: J. G. Leishman and T. S. Beddoes, J. American Helicopter Society 34(3) (1989) 3 (first-order lag of the trailing-edge separation point).
 Effect separation_lag() {
   Effect e;
   e.id = "separation-lag";
-  e.summary = "slow loss of lift after the step at high onset angle";
+  e.summary = "slow loss of lift after a step";
   e.equation = "phi(s) -> phi(s) - D (1 - exp(-s/T_s))";
   e.kind = "lift";
   e.source = "Leishman and Beddoes, J. American Helicopter Society 34(3) (1989) 3";
@@ -27,8 +24,8 @@ Effect separation_lag() {
   for (const double s : {4.0, 10.0, 25.0}) e.starts.push_back(Eigen::Vector2d(0.1, s));
   e.draw = [](const AeroelasticModel&, double, Effect::Random& random) { return log_between(random, {{0.01, 0.4}, {4, 40}}); };
   e.states = [](const AeroelasticModel& model, const Conditions&) -> Eigen::Index { return model.circulation().rate.size() > 0 ? static_cast<Eigen::Index>(model.rig().submerged.size()) : 0; };
-  e.acts_in = "a run in a stream at more than 8 degrees before the motion";
-  e.acts = [](const Rig&, const Conditions& c) { return c.speed > 0 && std::abs(c.onset_angle) > onset; };
+  e.acts_in = "a run in a stream";
+  e.acts = [](const Rig&, const Conditions& c) { return c.speed > 0; };
   e.in_the_load = true;
   e.needs = Needs::beam;
   e.apply = [](LinearSystem& system, const EffectContext& c) {

@@ -300,21 +300,31 @@ TEST(Effects, MainsAreFiftyOrSixtyHertz) {
   EXPECT_EQ(bounds_at(model, 0, mass.start), Effect::Band(mass.lower, mass.upper));
 }
 
-/// Section stall: both act from 8 degrees on (Leishman and Beddoes; Fage and Johansen).
-TEST(Effects, SeparationBeginsAtEightDegrees) {
-  for (const char* id : {"separation-lag", "vortex-shedding"}) {
-    Conditions c = conditions_for(beam());
-    for (const double degrees : {1.0, 7.9, -7.9}) {
-      c.onset_angle = degrees * pi / 180;
-      EXPECT_FALSE(effect(id).acts(beam(), c)) << id << " " << degrees;
-      const AeroelasticModel model = model_with(beam(), id), bare(beam(), model.basis(), model.circulation());
-      EXPECT_EQ(model.system(c, model.start_values(), {"gauge"}).states(), bare.system(c, bare.start_values(), {"gauge"}).states()) << id;
-    }
-    for (const double degrees : {8.1, 25.0, -8.1}) {
-      c.onset_angle = degrees * pi / 180;
-      EXPECT_TRUE(effect(id).acts(beam(), c)) << id << " " << degrees;
-    }
+/// Fage and Johansen: a street is shed from the angle of stall on.
+TEST(Effects, SheddingBeginsAtEightDegrees) {
+  const char* id = "vortex-shedding";
+  Conditions c = conditions_for(beam());
+  for (const double degrees : {1.0, 7.9, -7.9}) {
+    c.onset_angle = degrees * pi / 180;
+    EXPECT_FALSE(effect(id).acts(beam(), c)) << degrees;
+    const AeroelasticModel model = model_with(beam(), id), bare(beam(), model.basis(), model.circulation());
+    EXPECT_EQ(model.system(c, model.start_values(), {"gauge"}).states(), bare.system(c, bare.start_values(), {"gauge"}).states());
   }
+  for (const double degrees : {8.1, 25.0, -8.1}) {
+    c.onset_angle = degrees * pi / 180;
+    EXPECT_TRUE(effect(id).acts(beam(), c)) << degrees;
+  }
+}
+
+/// A step from rest at 2 degrees loses lift as one from 25 does.
+TEST(Effects, SeparationActsAtAnyAngleInAStream) {
+  Conditions c = conditions_for(beam());
+  for (const double degrees : {0.0, 2.0, 25.0}) {
+    c.onset_angle = degrees * pi / 180;
+    EXPECT_TRUE(effect("separation-lag").acts(beam(), c)) << degrees;
+  }
+  c.speed = 0;
+  EXPECT_FALSE(effect("separation-lag").acts(beam(), c));
 }
 
 TEST(Effects, SayWhyTheyCannotAct) {
