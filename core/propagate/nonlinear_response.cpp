@@ -203,7 +203,7 @@ class Follower {
     now_ = MatrixXd::Zero(one_.inputs(), block + 1);
     slope_ = MatrixXd::Zero(one_.arguments, block + 1);
     stepped_ = VectorXd::Zero(one_.rows());
-    z_ = z_before_ = arguments_.sees * drive_.start;
+    z_ = arguments_.sees * drive_.start;
     laws_.at(z_);
     now_.col(0).head(n) = drive_.start;
     now_.col(0).segment(one_.force(), m) = laws_.force;
@@ -254,9 +254,7 @@ class Follower {
       }
       small_product(one_.step.data(), one_.rows(), one_.inputs(), v.data(), 0, 1, stepped_.data(), 0);
       if (part == 0) response_.output.row(sample) = stepped_.segment(one_.output(), one_.channels).transpose();
-      const Few<M> straight_on = 2 * z_ - z_before_;
-      z_before_ = z_;
-      z_ = implicit_argument<M>(laws_, stepped_.segment(one_.argument(), one_.arguments), gain_, by_argument_, straight_on);
+      z_ = implicit_argument<M>(laws_, stepped_.segment(one_.argument(), one_.arguments), gain_, by_argument_, z_);
       next.head(n) = stepped_.head(n);
       for (Index i = 0; i < m; ++i) {
         const double force = laws_.force[i], z = z_[arguments_.first[static_cast<std::size_t>(i)]];
@@ -395,7 +393,7 @@ class Follower {
     MatrixXd over_sample;  // rows x [x; f; jerk]
   };
   std::vector<StraightStep> straight_;
-  Few<M> z_, z_before_;
+  Few<M> z_;
 };
 
 }  // namespace
