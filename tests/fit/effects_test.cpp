@@ -7,30 +7,31 @@
 #include "core/files/text_file.h"
 #include "fit/fit.h"
 #include "fit/likelihood/run_residual.h"
+#include "tests/support/shared_data.h"
 
 namespace unrig {
 namespace {
 
 const std::string campaigns = std::string(UNRIG_SOURCE_DIR) + "/sample_data/campaigns/";
 
-FitProblem campaign(const std::string& name, const std::string& effect_id) {
+FitProblem campaign(const std::string& folder, const std::string& name, const std::string& effect_id) {
   FitProblem problem;
-  problem.rig = read_rig(campaigns + name + "/rig.toml");
-  for (const char* run : {"dry_pluck", "wet_pluck", "step_a", "step_b", "step_c"}) problem.runs.push_back(read_run(campaigns + name + "/" + run + ".csv"));
+  problem.rig = read_rig(folder + name + "/rig.toml");
+  for (const char* run : {"dry_pluck", "wet_pluck", "step_a", "step_b", "step_c"}) problem.runs.push_back(read_run(folder + name + "/" + run + ".csv"));
   problem.effects = {effect_id};
   return problem;
 }
 
 /// Every parameter within three of its standard errors of the key, and every run down to the noise (the bounds that the project promises).
-void expect_recovered(const std::string& name, const std::string& effect_id, const std::map<std::string, double>& effect_truth) {
-  const nlohmann::json key = nlohmann::json::parse(read_text(campaigns + "KEY.json"))[name];
+void expect_recovered(const std::string& name, const std::string& effect_id, const std::map<std::string, double>& effect_truth, const std::string& folder = campaigns) {
+  const nlohmann::json key = nlohmann::json::parse(read_text(folder + "KEY.json"))[name];
   std::map<std::string, double> truth = {{"normal.stiffness_scale", key["truth"]["kn"]},
                                          {"torsion.stiffness_scale", key["truth"]["kt"]},
                                          {"normal.damping_ratio", key["truth"]["zeta_n"]},
                                          {"torsion.damping_ratio", key["truth"]["zeta_t"]},
                                          {"apparent_mass_coefficient", key["truth"]["Ca"]}};
   truth.insert(effect_truth.begin(), effect_truth.end());
-  const FitResult result = fit(campaign(name, effect_id));
+  const FitResult result = fit(campaign(folder, name, effect_id));
   EXPECT_TRUE(result.converged) << result.message;
   std::size_t seen = 0;
   for (const FittedParameter& p : result.parameters) {
@@ -56,6 +57,14 @@ TEST(FittedEffects, TankWaveIsRecovered) {
 TEST(FittedEffects, GaugeLowpassIsRecovered) {
   const double cutoff = nlohmann::json::parse(read_text(campaigns + "KEY.json"))["lowpass"]["parameters"]["cutoff_hz"];
   expect_recovered("lowpass", "gauge-lowpass", {{"gauge-lowpass.cutoff", cutoff}});
+}
+
+/// Steps from 2, 4 and 25 degrees lose lift alike.
+TEST(FittedEffects, SeparationIsRecoveredFromStepsAtAnyAngle) {
+  UNRIG_NEEDS_SHARED("campaigns/open2");
+  const std::string folder = test::shared_path("campaigns/open2/");
+  const nlohmann::json truth = nlohmann::json::parse(read_text(folder + "KEY.json"))["a4"]["parameters"]["separation"];
+  expect_recovered("a4", "separation-lag", {{"separation-lag.loss", truth["loss"]}, {"separation-lag.time", truth["time_semichords"]}}, folder);
 }
 
 /// The gradient of chi-square that a free decay gives with a nonlinear force at work, everything linear following, against central differences: exact tangents leave the
