@@ -10,8 +10,7 @@ constexpr const char* steps = "Record a step of the angle and let it run for som
 
 /// Slow loss of lift after a change of the angle, while the separation point moves forward along the suction side: of the circulatory force on a strip the
 /// share D of what the downwash w would give in the end is lost with the time constant T_s in semichords, N -= s rho U b l D y, y' = (U / b T_s) (w - y), so that
-/// phi(s) -> phi(s) - D (1 - exp(-s/T_s)). D and T_s are shared by all runs in a stream:
-/// where separation begins hangs on section and Reynolds number (a flat plate's with its leading edge at any angle), so that no angle bars it.
+/// phi(s) -> phi(s) - D (1 - exp(-s/T_s)). D and T_s are shared by all runs in a stream, at any angle.
 /// Source: J. G. Leishman and T. S. Beddoes, J. American Helicopter Society 34(3) (1989) 3 (first-order lag of the trailing-edge separation point).
 Effect separation_lag() {
   Effect e;

@@ -3,7 +3,6 @@
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
-#include <numeric>
 
 #include "core/propagate/feedback_force.h"
 #include "core/numerics/small_product.h"
@@ -188,8 +187,7 @@ class Follower {
     }
     response_.largest_argument = largest_;
     response_.end = now_.col(0).head(one_.states);
-    response_.end_tangent.resize(one_.states, columns_);
-    response_.end_tangent(Eigen::all, told_as_) = tangent_.topRows(one_.states);
+    response_.end_tangent = tangent_.topRows(one_.states);
     return std::move(response_);
   }
 
@@ -199,7 +197,7 @@ class Follower {
   void begin() {
     const Index n = one_.states, m = one_.feedbacks, block = std::min(most_at_a_time, steps_);
     response_.output.resize(samples_, one_.channels);
-    response_.tangent.assign(static_cast<std::size_t>(columns_ > 0 ? one_.channels : 0), MatrixXd::Zero(samples_, columns_));
+    response_.tangent.assign(static_cast<std::size_t>(columns_ > 0 ? one_.channels : 0), MatrixXd(samples_, columns_));
     now_ = MatrixXd::Zero(one_.inputs(), block + 1);
     slope_ = MatrixXd::Zero(one_.arguments, block + 1);
     stepped_ = VectorXd::Zero(one_.rows());
@@ -211,31 +209,11 @@ class Follower {
     law_partial_ = MatrixXd::Zero(m, one_.parameters * (block + 1));
     if (one_.parameters > 0) laws_.partials_at(z_, law_partials(0));
     largest_ = VectorXd::Zero(m);
-    order_columns();
     tangent_ = next_ = MatrixXd::Zero(std::max(one_.rows(), one_.input()), columns_);  // the jerk is that of the sample
-    const Index p = one_.parameters;
-    if (p > 0 && drive_.start_partial.size() > 0) tangent_.topLeftCorner(n, p) = drive_.start_partial;
-    for (Index j = p; j < columns_; ++j) tangent_.col(j).head(n) = drive_.start_tangent.col(told_as_[static_cast<std::size_t>(j)]);
+    if (directions_ > 0) tangent_.topLeftCorner(n, directions_) = drive_.start_tangent;
+    if (one_.parameters > 0 && drive_.start_partial.size() > 0) tangent_.topRightCorner(n, one_.parameters) = drive_.start_partial;
     tangent_.middleRows(one_.force(), m) = by_feedback(slope_.col(0).asDiagonal() * (arguments_.sees * tangent_.topRows(n)));
-    tangent_.block(one_.force(), 0, m, p) += law_partials(0);
-  }
-
-  /// Parameters, then directions by the sample at which they begin: one that is zero so far is not carried.
-  void order_columns() {
-    begins_.assign(static_cast<std::size_t>(directions_), samples_);
-    const bool driven = drive_.jerk_tangent.size() > 0;
-    for (Index j = 0; j < directions_; ++j) {
-      Index& begins = begins_[static_cast<std::size_t>(j)];
-      if (!drive_.start_tangent.col(j).isZero(0)) begins = 0;
-      for (Index k = 0; driven && k < begins; ++k)
-        if (drive_.jerk_tangent(k, j) != 0) begins = k;
-    }
-    told_as_.resize(static_cast<std::size_t>(columns_));
-    const auto first = told_as_.begin() + one_.parameters;
-    std::iota(told_as_.begin(), first, directions_);
-    std::iota(first, told_as_.end(), 0);
-    std::stable_sort(first, told_as_.end(), [&](Index a, Index b) { return begins_[static_cast<std::size_t>(a)] < begins_[static_cast<std::size_t>(b)]; });
-    carried_ = one_.parameters;
+    tangent_.block(one_.force(), directions_, m, one_.parameters) += law_partials(0);
   }
 
   auto law_partials(Index k) { return law_partial_.middleCols(k * one_.parameters, one_.parameters); }
@@ -282,39 +260,33 @@ class Follower {
     for (Index k = 0; k < count; ++k) {
       const Index sample = (first + k) / per_sample_;
       const bool reads = (first + k) % per_sample_ == 0;
-      if (reads) begin_directions(sample);
-      const Index directions = carried_ - p;
-      if (reads && directions > 0 && k + per_sample_ <= count && straight_over(k)) {
+      if (reads && drive_.jerk_tangent.size() > 0) directions_jerk() = drive_.jerk_tangent.row(sample);
+      if (reads && directions_ > 0 && k + per_sample_ <= count && straight_over(k)) {
         const MatrixXd& over_sample = straight_step(slope_.col(k));
-        small_product(over_sample.data(), rows, one_.input(), tangent_.col(p).data(), tangent_.rows(), directions, next_.col(p).data(), next_.rows());
-        read(sample, p, carried_);
-        tangent_.block(0, p, one_.jerk(), directions) = next_.block(0, p, one_.jerk(), directions);
+        small_product(over_sample.data(), rows, one_.input(), tangent_.data(), tangent_.rows(), directions_, next_.data(), next_.rows());
+        read(sample, 0, directions_);
+        tangent_.topLeftCorner(one_.jerk(), directions_) = next_.topLeftCorner(one_.jerk(), directions_);
         ahead = per_sample_;
       }
-      const Index to = ahead > 0 ? p : carried_;  // columns to be carried step by step
-      if (to > 0) {
-        small_product(one_.step.data(), rows, one_.input(), tangent_.data(), tangent_.rows(), to, next_.data(), next_.rows());
-        for (Index j = 0; j < p; ++j) next_.col(j).head(rows) += source_.col(k).segment(j * rows, rows);
-        if (reads) read(sample, 0, to);
-        if (p > 0) next_.topLeftCorner(rows, p) += one_.late.lazyProduct(law_partials(k + 1));
-        feed_back(slope_.col(k + 1), to);
-        if (p > 0) next_.block(one_.force(), 0, m, p) += law_partials(k + 1);
-        tangent_.topLeftCorner(one_.jerk(), to) = next_.topLeftCorner(one_.jerk(), to);
+      const Index from = ahead > 0 ? directions_ : 0;  // first column to be carried step by step
+      if (from < columns_) {
+        small_product(one_.step.data(), rows, one_.input(), tangent_.col(from).data(), tangent_.rows(), columns_ - from, next_.col(from).data(), next_.rows());
+        auto by_parameter = next_.rightCols(p);
+        for (Index j = 0; j < p; ++j) by_parameter.col(j).head(rows) += source_.col(k).segment(j * rows, rows);
+        if (reads) read(sample, from, columns_);
+        if (p > 0) by_parameter.topRows(rows) += one_.late.lazyProduct(law_partials(k + 1));
+        feed_back(slope_.col(k + 1), from);
+        if (p > 0) by_parameter.middleRows(one_.force(), m) += law_partials(k + 1);
+        tangent_.block(0, from, one_.jerk(), columns_ - from) = next_.block(0, from, one_.jerk(), columns_ - from);
       }
       if (ahead > 0) --ahead;
     }
   }
 
-  /// Those that begin with this sample; the jerk in each over it.
-  void begin_directions(Index sample) {
-    while (carried_ < columns_ && begins_[static_cast<std::size_t>(told_as_[static_cast<std::size_t>(carried_)])] <= sample) ++carried_;
-    if (drive_.jerk_tangent.size() == 0) return;
-    for (Index j = one_.parameters; j < carried_; ++j) tangent_(one_.jerk(), j) = drive_.jerk_tangent(sample, told_as_[static_cast<std::size_t>(j)]);
-  }
+  auto directions_jerk() { return tangent_.row(one_.jerk()).head(directions_); }
 
   void read(Index sample, Index from, Index to) {
-    for (Index c = 0; c < one_.channels; ++c)
-      for (Index j = from; j < to; ++j) response_.tangent[static_cast<std::size_t>(c)](sample, told_as_[static_cast<std::size_t>(j)]) = next_(one_.output() + c, j);
+    for (Index c = 0; c < one_.channels; ++c) response_.tangent[static_cast<std::size_t>(c)].row(sample).segment(from, to - from) = next_.row(one_.output() + c).segment(from, to - from);
   }
 
   /// Whether the laws have one slope each all over the sample that begins with step k.
@@ -338,11 +310,11 @@ class Follower {
     return straight_.back().over_sample;
   }
 
-  /// Puts the change of the force where that of its argument stands, and adds what it does to the state, in the first `to` columns.
-  void feed_back(const Few<M>& slope, Index to) {
+  /// Puts the change of the force where that of its argument stands, and adds what it does to the state, in columns `from` on.
+  void feed_back(const Few<M>& slope, Index from) {
     const Index n = one_.states, m = one_.feedbacks;
     const FewSquare<M> answer = answer_of(slope);
-    for (Index j = 0; j < to; ++j) {
+    for (Index j = from; j < columns_; ++j) {
       const Few<M> by_argument = answer.lazyProduct(next_.col(j).segment(one_.argument(), one_.arguments));
       const Few<M> force = of_feedbacks(by_argument);
       for (Index i = 0; i < m; ++i) next_.col(j).head(n) += force[i] * one_.late.col(i).head(n);
@@ -381,8 +353,7 @@ class Follower {
   Arguments arguments_;
   Laws<M> laws_;
   StepMatrices one_;
-  Index directions_, columns_, carried_ = 0;
-  std::vector<Index> begins_, told_as_;  // sample at which each direction begins; column of the response that each of ours is
+  Index directions_, columns_;
   FewSquare<M> gain_;         // arguments x feedbacks: how the force at the end of a step moves what the laws see there
   FewSquare<M> by_argument_;  // the same for each argument's feedback
   NonlinearResponse response_;
