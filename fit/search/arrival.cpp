@@ -1,4 +1,5 @@
 #include "fit/search/arrival.h"
+#include "fit/search/decays_first.h"
 
 #include <algorithm>
 #include <cmath>
@@ -241,12 +242,34 @@ std::vector<VectorXd> tone_starts(const JointProblem& joint, const Effect& e) {
   return starts;
 }
 
-std::vector<VectorXd> starts_of(JointProblem& joint, const Effect& e) {
-  if (e.frequency && !e.parameters_on(joint.model().rig()).empty()) return tone_starts(joint, e);
-  if (!e.starts_for) return e.starts;
+/// Largest first argument of the nonlinear effects along the trajectories of the model.
+double largest_argument_of_model(const JointProblem& joint) {
   double largest = 0;
   for (std::size_t r = 0; r < joint.runs().size(); ++r)
     if (const VectorXd seen = joint.runs()[r].largest_arguments(joint.theta(r)); seen.size() > 0) largest = std::max(largest, seen.maxCoeff());
+  return largest;
+}
+
+/// The same along the states that the decays ask for beside unknown forces; 0 without decays.
+double largest_argument_of_readings(const JointProblem& joint) {
+  if (!has_decays(joint)) return 0;
+  const BesideUnknownForces beside = beside_unknown_forces(joint);
+  double largest = 0;
+  for (std::size_t r = 0; r < joint.runs().size(); ++r) {
+    if (beside.states[r].size() == 0) continue;
+    const RunResidual& run = joint.runs()[r];
+    for (const Feedback& feedback : run.model().system(run.conditions(), beside.joint.theta(r), run.channels()).feedback)
+      largest = std::max(largest, (feedback.sees.row(0) * beside.states[r]).cwiseAbs().maxCoeff());
+  }
+  return largest;
+}
+
+/// `astray`: the model does not move as the rig did.
+std::vector<VectorXd> starts_of(JointProblem& joint, const Effect& e, bool astray) {
+  if (e.frequency && !e.parameters_on(joint.model().rig()).empty()) return tone_starts(joint, e);
+  if (!e.starts_for) return e.starts;
+  double largest = astray ? largest_argument_of_readings(joint) : 0;
+  if (!(largest > 0)) largest = largest_argument_of_model(joint);
   return largest > 0 ? e.starts_for(joint.model(), largest) : e.starts;
 }
 
@@ -265,7 +288,7 @@ void choose_effect_starts(Arrival& arrival, const FitProblem& problem, const std
         for (std::size_t k = 0; k < parameters.size(); ++k)
           if (joint.parameter(*u).name == id + "." + parameters[k].name) u->value = values[static_cast<Index>(k)];
     };
-    const std::vector<VectorXd> starts = starts_of(judge, effect(problem.rig, id));
+    const std::vector<VectorXd> starts = starts_of(judge, effect(problem.rig, id), lost);
     const VectorXd* best = nullptr;
     double least = std::numeric_limits<double>::infinity();
     for (const VectorXd& start : starts) {

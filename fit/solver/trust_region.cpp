@@ -170,7 +170,7 @@ SearchOutcome search(const LeastSquaresProblem& problem, const LeastSquaresPoint
   options.use_nonmonotonic_steps = strategy.nonmonotonic;
   options.jacobi_scaling = strategy.column_scaling;
   options.initial_trust_region_radius = strategy.first_radius;
-  options.line_search_interpolation_type = ceres::BISECTION;  // along bounds: no derivatives for steps that are not taken
+  options.max_num_line_search_step_size_iterations = 0;  // a step beyond a bound is cut off at it; searching along the bounds costs more than it gains
   options.max_num_consecutive_invalid_steps = 100;  // not the end: the trust region shrinks until the model answers
   options.gradient_tolerance = 0;  // has the unit of the unknowns
   options.parameter_tolerance = 1e-16;
