@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "fit/search/find_motion.h"
 #include "fit/uncertainty/undetermined.h"
 
 namespace unrig {
@@ -42,10 +43,10 @@ HeldoutResidual predict_heldout(const Arrival& arrival, const FitProblem& proble
   options.most_evaluations = 15;
   RunResidual& residual = joint.runs().front();
   residual.follow_in(arrival.joint.runs().front().finer());
-  residual.find_linear(joint.theta(0));
+  find_motion(residual, joint.theta(0));
   joint.solve(options);
   constexpr double followed = 1.5;
-  if (joint.chi2() > followed * static_cast<double>(residual.degrees_of_freedom()) && residual.find_linear(joint.theta(0), true)) joint.solve(options);
+  if (joint.chi2() > followed * static_cast<double>(residual.degrees_of_freedom()) && find_motion(residual, joint.theta(0), true)) joint.solve(options);
   residual.reject_spikes(joint.theta(0));
   joint.solve(options);
   const RunResidual::Prediction p = residual.predict(joint.theta(0));

@@ -11,6 +11,7 @@
 #include "fit/search/decays_first.h"
 #include "fit/fit.h"
 #include "fit/fit_description.h"
+#include "fit/search/find_motion.h"
 #include "fit/search/own_parameters.h"
 #include "fit/likelihood/readings_noise.h"
 #include "fit/likelihood/standardised_residual.h"
@@ -314,7 +315,15 @@ void fit_fully(Trial& trial, int rounds) {
 }
 
 void follow_finer(Trial& trial, Index times) {
-  for (RunResidual& run : trial.arrival.joint.runs()) run.follow_in(times);
+  JointProblem& joint = trial.arrival.joint;
+  for (RunResidual& run : joint.runs()) run.follow_in(times);
+  fit_fully(trial, 2);
+  const auto lost = [&](std::size_t r) { return joint.runs()[r].motion().unknowns() > 0 && trial.variance[r] > explained; };
+  bool any = false;
+  for (std::size_t r = 0; r < joint.runs().size(); ++r) any = any || lost(r);
+  if (!any) return;
+  fit_own_parameters(joint);  // theta is nearer now
+  temper(joint);
   fit_fully(trial, 2);
 }
 
@@ -346,7 +355,7 @@ bool fit_decays_first(Trial& trial, const Trial& base, bool from_here) {
     in_parallel(joint.runs().size(), [&](std::size_t r) {  // c of the others still is the baseline's
       constexpr double astray = 10;
       RunResidual& run = joint.runs()[r];
-      if (run.takes_small_steps(joint.theta(r)) || trial.variance[r] > astray) run.find_linear(joint.theta(r));
+      if (run.takes_small_steps(joint.theta(r)) || trial.variance[r] > astray) find_motion(run, joint.theta(r));
     });
   temper(joint);
   measure(trial);

@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "core/numerics/in_parallel.h"
+#include "fit/search/find_motion.h"
 
 namespace unrig {
 namespace {
@@ -27,7 +28,8 @@ JointProblem fitted_alone(const JointProblem& joint, std::size_t r) {
     alone.solve(options);
     if (alone.chi2() < enough) break;
     JointProblem other = alone;  // the motion once more from its beginning, as it leads there with these values
-    other.runs().front().find_linear(other.theta(0), true);
+    if (RunResidual& run = other.runs().front(); run.takes_small_steps(other.theta(0))) find_motion(run, other.theta(0), true);
+    else lead_in(run, other.theta(0), [&] { other.solve(options); });
     if (!(other.chi2() < alone.chi2())) break;
     alone = std::move(other);
   }

@@ -1,0 +1,52 @@
+#include "fit/search/find_motion.h"
+
+#include <gtest/gtest.h>
+
+#include <string>
+#include <vector>
+
+#include "fit/fit.h"
+#include "fit/search/own_parameters.h"
+#include "tests/support/shared_data.h"
+
+namespace unrig {
+namespace {
+
+TEST(FindMotion, AStepBesideDryFrictionIsFollowedToItsNoise) {
+  UNRIG_NEEDS_SHARED("campaigns/concealed/c08/rig.toml");
+  const auto path = [](const char* file) { return test::shared_path(std::string("campaigns/concealed/c08/") + file); };
+  FitProblem decays;
+  decays.rig = read_rig(path("rig.toml"));
+  for (const char* file : {"dry_pluck.csv", "wet_pluck.csv"}) decays.runs.push_back(read_run(path(file)));
+  decays.effects = {"coulomb-friction"};
+  const FitResult known = fit(decays);
+
+  const std::vector<unrig::Run> step{read_run(path("step_b.csv"))};
+  const AeroelasticModel model = model_of(decays.rig, step, decays.circulation, decays.effects);
+  std::vector<RunResidual> one;
+  one.emplace_back(model, step.front(), motion_windows(step.front()));
+  JointProblem joint(model, std::move(one));
+  for (Unknown& u : joint.unknowns())
+    for (const FittedParameter& p : known.parameters)
+      if (u.run < 0 && p.name == joint.parameter(u).name) u.value = p.value;
+
+  const auto freedom = static_cast<double>(joint.runs().front().degrees_of_freedom());
+  JointProblem without = joint;
+  without.solve({});
+  EXPECT_GT(without.chi2(), 10 * freedom) << "a search that lets in all of the gauge at once ends in a least chi-square of other jerks";
+  fit_own_parameters(joint);
+  constexpr double by_chance = 0.1;  // five standard deviations of chi-square over 5700 samples
+  EXPECT_LT(joint.chi2(), (1 + by_chance) * freedom);
+}
+
+TEST(FindMotion, OfALinearModelThereIsNothingToFind) {
+  UNRIG_NEEDS_SHARED("campaigns/concealed/c08/rig.toml");
+  const Rig rig = read_rig(test::shared_path("campaigns/concealed/c08/rig.toml"));
+  const std::vector<unrig::Run> step{read_run(test::shared_path("campaigns/concealed/c08/step_b.csv"))};
+  const AeroelasticModel model = model_of(rig, step, Wagner::within_1e4, {});
+  RunResidual run(model, step.front(), motion_windows(step.front()));
+  EXPECT_FALSE(find_motion(run, model.start_values()));
+}
+
+}  // namespace
+}  // namespace unrig
