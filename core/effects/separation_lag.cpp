@@ -28,49 +28,12 @@ Effect separation_lag() {
   e.in_the_load = true;
   e.needs = Needs::beam;
   e.apply = [](LinearSystem& system, const EffectContext& c) {
-    const Eigen::Index n = system.states(), first = 2 * system.coordinates, terms = c.model.circulation().rate.size(), parameters = c.theta.size(), inputs = system.B.cols();
-    if (system.lags == 0 || terms == 0) return;
-    const Eigen::Index strips = system.lags / terms;
-    const Rig& rig = c.model.rig();
-    const double b = rig.semichord(), per_time = c.conditions.speed / b, loss = c.parameter(0), time = c.parameter(1);
-    // The downwash stands in the first lag's rows, y' = rate (w - y); what a strip's circulation does, in its columns, times its amplitude.
-    const double rate = c.model.circulation().rate[0] * per_time, amplitude = c.model.circulation_amplitude(c.theta, 0);
-    const DualMatrix w_states = (1 / rate) * system.A.block(first, 0, strips, n), w_inputs = (1 / rate) * system.B.block(first, 0, strips, inputs);
-    DualMatrix downwash(Eigen::MatrixXd::Zero(strips, n), parameters);
-    downwash.value = w_states.value;
-    downwash.value.middleCols(first, strips) += Eigen::MatrixXd::Identity(strips, strips);
-    DualMatrix push = (1 / amplitude) * system.A.block(0, first, n, strips), read = (1 / amplitude) * system.C.block(0, first, system.C.rows(), strips);
-    push.value.middleRows(first, system.lags).setZero();
-    for (Eigen::MatrixXd& p : push.partial)
-      if (p.size() > 0) p.middleRows(first, system.lags).setZero();
-
-    // States lag' = (per_time / T_s) (w - lag); force -D lag.
-    const Eigen::Index total = n + strips;
-    DualMatrix A(Eigen::MatrixXd::Zero(total, total), parameters), B(Eigen::MatrixXd::Zero(total, inputs), parameters), C(Eigen::MatrixXd::Zero(system.C.rows(), total), parameters);
-    A.set_block(0, 0, system.A);
-    B.set_block(0, 0, system.B);
-    C.set_block(0, 0, system.C);
-    const auto lose = [&](const DualMatrix& per_lag) {
-      DualMatrix lost = (-loss) * per_lag;
-      lost.partial.resize(static_cast<std::size_t>(parameters));
-      lost.add_partial(c.first_parameter, -per_lag.value);
-      return lost;
-    };
-    A.set_block(0, n, lose(push));
-    C.set_block(0, n, lose(read));
-    Eigen::MatrixXd own(strips, total);
-    own << downwash.value, -Eigen::MatrixXd::Identity(strips, strips);
-    const double lag_rate = per_time / time;
-    DualMatrix rows(lag_rate * own, parameters);
-    rows.add_partial(c.first_parameter + 1, -lag_rate / time * own);
-    A.set_block(n, 0, rows);
-    DualMatrix input_rows(lag_rate * w_inputs.value, parameters);
-    input_rows.add_partial(c.first_parameter + 1, -lag_rate / time * w_inputs.value);
-    B.set_block(n, 0, input_rows);
-    system.A = A;
-    system.B = B;
-    system.C = C;
-    for (Eigen::Index s = 0; s < strips; ++s) system.settling.push_back(n + s);
+    if (system.lags == 0) return;
+    const double loss = c.parameter(0), time = c.parameter(1);
+    const Eigen::Index lag = append_lag(system, c, c.on_strips(1, 1 / time, -1 / (time * time)));
+    DualMatrix lost(Eigen::MatrixXd::Zero(c.ports.strips, system.states()), c.theta.size());
+    lost.set_block(0, lag, c.on_strips(0, -loss, -1));
+    add_circulation(system, c, {lost, DualMatrix(Eigen::MatrixXd::Zero(c.ports.strips, system.B.cols()), c.theta.size())});
   };
   return e;
 }
