@@ -61,6 +61,8 @@ struct Effect {
   std::vector<Band> bands;
   /// Values from which a search should start, besides the parameters' own: one vector per start. The linear unknowns (amplitudes) follow by themselves.
   std::vector<Eigen::VectorXd> starts;
+  /// Terms that it may do without, by the places of their parameters, the amplitude first: without it (0) the others mean nothing. A diagnosis counts those that it needs.
+  std::vector<std::vector<Eigen::Index>> terms = {};
   /// Of a nonlinear effect whose starts depend on the size of the response: from the largest argument that its law sees in the runs.
   std::function<std::vector<Eigen::VectorXd>(const AeroelasticModel&, double largest_argument)> starts_for;
   /// Of an effect that shows as a line in the spectrum: its frequency [Hz] in a run, for its parameters. A search then follows the lines of the residual's spectrum

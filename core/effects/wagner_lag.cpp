@@ -34,6 +34,7 @@ Effect wagner_lag() {
                   {"rate_1", "1", 0.1, 0.01, 10, false, steps},
                   {"amplitude_2", "1", 0, 0, 2, false, steps},
                   {"rate_2", "1", 0.6, 0.01, 10, false, steps}};
+  e.terms = {{1, 2}, {3, 4}};
   // All replaced: from a small share the search loses a term to an amplitude of zero, and from there it does not come back.
   const auto start = [&](double a1, double r1, double a2, double r2) { e.starts.push_back((Eigen::VectorXd(5) << 1, a1, r1, a2, r2).finished()); };
   start(0.165, 0.0455, 0.335, 0.3);  // Jones' exponentials for the function itself
