@@ -290,6 +290,12 @@ FittedRig read_fit(const json& in, const std::string& path) {
       p.std_error = item.at("std_error").is_number() ? item.at("std_error").get<double>() : std::nan("");
       if (p.std_error <= 0) throw refuse(fmt::format("the standard error of {} is {:g}, where one is above zero or null", p.name, p.std_error));
       p.identified = item.value("identified", true);
+      for (const std::string& id : fit.effects) {
+        const Effect& e = effect(laws, id);
+        const auto is_it = [&](const Parameter& own) { return id + "." + own.name == p.name; };
+        if (p.name.starts_with(id + ".") && std::none_of(e.parameters.begin(), e.parameters.end(), is_it) && std::none_of(e.modal_parameters.begin(), e.modal_parameters.end(), is_it))
+          throw refuse(fmt::format("a parameter {}, which the effect {} of this version does not have", p.name, id));
+      }
       fit.parameters.push_back(p);
     }
     const auto n = static_cast<Eigen::Index>(fit.parameters.size());

@@ -33,6 +33,13 @@ Index append(LinearSystem& system, const DualMatrix& F) {
 
 }  // namespace
 
+DualMatrix EffectContext::on_strips(Index k, double value, double slope) const {
+  const MatrixXd unit = MatrixXd::Identity(ports.strips, ports.strips);
+  DualMatrix diagonal(value * unit, theta.size());
+  diagonal.add_partial(first_parameter + k, slope * unit);
+  return diagonal;
+}
+
 bool has(const Rig& rig, Needs needs) {
   const auto reads_twist = [](const Sensor& s) { return s.reads == SensorKind::twist || s.reads == SensorKind::twist_rate; };
   if (needs == Needs::any_rig) return true;
@@ -106,6 +113,48 @@ Index append_memory(LinearSystem& system, const DualMatrix& direction, const Dua
   if (rate.parameters > most_law_parameters || rate.sees.rows() > most_law_arguments) throw std::logic_error("a law with more parameters or arguments than core/propagate/feedback_force.h has room for");
   system.feedback.push_back(std::move(rate));
   return memory;
+}
+
+OnStrips downwash(const LinearSystem& system, const EffectContext& c) {
+  // It stands in the rows of the circulation's first lag, y' = rate (w - y), with whatever moves the mount.
+  const Index first = 2 * system.coordinates, strips = c.ports.strips;
+  const double rate = c.model.circulation().rate[0] * c.conditions.speed / c.model.rig().semichord();
+  OnStrips w{(1 / rate) * system.A.block(first, 0, strips, system.states()), (1 / rate) * system.B.block(first, 0, strips, system.B.cols())};
+  w.of_states.value.middleCols(first, strips) += MatrixXd::Identity(strips, strips);
+  return w;
+}
+
+Index append_lag(LinearSystem& system, const EffectContext& c, const DualMatrix& rate) {
+  const Index lag = system.states(), strips = c.ports.strips;
+  const DualMatrix per_time = (c.conditions.speed / c.model.rig().semichord()) * rate;
+  const OnStrips w = downwash(system, c);
+  system.A = system.A.grown(lag + strips, lag + strips);
+  system.A.set_block(lag, 0, per_time * w.of_states);
+  system.A.set_block(lag, lag, -1.0 * per_time);
+  system.B = system.B.grown(lag + strips, system.B.cols());
+  system.B.set_block(lag, 0, per_time * w.of_inputs);
+  system.C = system.C.grown(system.C.rows(), lag + strips);
+  for (Index s = 0; s < strips; ++s) system.settling.push_back(lag + s);
+  return lag;
+}
+
+void add_circulation(LinearSystem& system, const EffectContext& c, const OnStrips& change) {
+  const Rig& rig = c.model.rig();
+  const double b = rig.semichord(), strength = c.conditions.density * c.conditions.speed * b * rig.strip_length;
+  // By the ports: where the share of Wagner's function is replaced, the columns of its lags no longer tell what circulation does.
+  MatrixXd at_quarter_chord = MatrixXd::Zero(system.B.cols(), c.ports.strips);
+  for (Index s = 0; s < c.ports.strips; ++s) {
+    at_quarter_chord(c.ports.strip + s, s) = 1;
+    at_quarter_chord.col(s).segment(c.ports.coordinate, c.ports.coordinates) = (0.5 + rig.axis()) * b * c.model.basis().twist.row(rig.submerged[static_cast<std::size_t>(s)] - 1).transpose();
+  }
+  const Index slope = c.model.index("normal_force_slope");
+  DualMatrix direction(c.theta[slope] * strength * at_quarter_chord, c.theta.size());
+  direction.add_partial(slope, strength * at_quarter_chord);
+  const DualMatrix push = system.B * direction, direct = system.D * direction;
+  system.A = system.A + push * change.of_states;
+  system.B = system.B + push * change.of_inputs;
+  system.C = system.C + direct * change.of_states;
+  system.D = system.D + direct * change.of_inputs;
 }
 
 Eigen::RowVectorXd first_mode(const AeroelasticModel& model, Index coordinates) {

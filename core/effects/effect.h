@@ -31,6 +31,8 @@ struct EffectContext {
   Ports ports;
 
   double parameter(Eigen::Index k) const { return theta[first_parameter + k]; }
+  /// `value` on every strip, which changes with the effect's parameter k by `slope`: strips x strips, diagonal.
+  DualMatrix on_strips(Eigen::Index k, double value, double slope) const;
 };
 
 /// What a rig must have for an effect to make sense: elements and strips, not only modes; and of these a sensor of the twist.
@@ -59,6 +61,8 @@ struct Effect {
   std::vector<Band> bands;
   /// Values from which a search should start, besides the parameters' own: one vector per start. The linear unknowns (amplitudes) follow by themselves.
   std::vector<Eigen::VectorXd> starts;
+  /// Terms that it may do without, by the places of their parameters, the amplitude first: without it (0) the others mean nothing. A diagnosis counts those that it needs.
+  std::vector<std::vector<Eigen::Index>> terms = {};
   /// Of a nonlinear effect whose starts depend on the size of the response: from the largest argument that its law sees in the runs.
   std::function<std::vector<Eigen::VectorXd>(const AeroelasticModel&, double largest_argument)> starts_for;
   /// Of an effect that shows as a line in the spectrum: its frequency [Hz] in a run, for its parameters. A search then follows the lines of the residual's spectrum
@@ -115,6 +119,17 @@ void append_feedback(LinearSystem& system, const DualMatrix& direction, Feedback
 /// A force with memory: `force` times z (1 x 1, with partials) along `direction`, z' = `rate`, z = 0 where the run begins. The arguments of `rate` are what it sees,
 /// and z behind them. Returns the index of z among the states.
 Eigen::Index append_memory(LinearSystem& system, const DualMatrix& direction, const DualMatrix& force, Feedback rate);
+
+/// What each strip has, linear in states and inputs: strips x states, strips x inputs.
+struct OnStrips {
+  DualMatrix of_states, of_inputs;
+};
+/// Downwash w [m/s] at three-quarter chord of each strip (AeroelasticModel). Of a beam in a stream.
+OnStrips downwash(const LinearSystem& system, const EffectContext& context);
+/// A lag of the downwash on each strip, y' = r (U/b) (w - y), at rest where the rig is. `rate`: r [1/semichord] on the strips. Returns the index of the first strip's y.
+Eigen::Index append_lag(LinearSystem& system, const EffectContext& context, const DualMatrix& rate);
+/// The circulatory force on each strip grows by s rho U b l times `change` [m/s], at quarter chord; s the slope of the run's normal force.
+void add_circulation(LinearSystem& system, const EffectContext& context, const OnStrips& change);
 
 /// `amount` on input column `column`, as a direction for append_feedback.
 DualMatrix port(const LinearSystem& system, Eigen::Index column, double amount);

@@ -2,63 +2,80 @@
 
 namespace unrig {
 
-/// Circulation that builds up differently from Wagner's function (finite span, free surface): phi(s) = 1 - a sum_k A_k exp(-r b_k s), A_k and b_k those of the model's
-/// circulation; r stretches time, a the part of the lift that comes late. a = r = 1 is the model's own.
-/// Source: R. T. Jones, NACA Report 681 (1940): on wings of finite span the lift starts higher and settles sooner, exponentials again.
+namespace {
+
+constexpr const char* steps = "Record faster steps of the angle, and let them run for some ten semichords.";
+
+/// What is still missing of the downwash, lag - w, of the lags that begin at a state.
+OnStrips missing(const OnStrips& w, Eigen::Index lag) {
+  OnStrips m{-1.0 * w.of_states, -1.0 * w.of_inputs};
+  m.of_states.value.middleCols(lag, m.of_states.rows()) += Eigen::MatrixXd::Identity(m.of_states.rows(), m.of_states.rows());
+  return m;
+}
+
+}  // namespace
+
+/// Circulation that builds up differently from Wagner's function (finite span, free surface): the share w of it replaced by two exponentials of their own,
+///
+///   phi(s) = 1 - (1 - w) sum_k A_k exp(-b_k s) - a_1 exp(-r_1 s) - a_2 exp(-r_2 s)
+///
+/// A_k and b_k [1/semichord] those of the model's circulation. w = a_1 = a_2 = 0 is the model's own; w = 1 leaves nothing of it. No amplitude a is negative: lift that comes and is lost again is
+/// separation's (core/effects/separation_lag.cpp). Shared by all runs in a stream.
+/// Source: R. T. Jones, NACA Report 681 (1940): on wings of finite span the lift starts higher and settles sooner, exponentials of other amplitudes and rates.
 Effect wagner_lag() {
   Effect e;
   e.id = "wagner-lag";
   e.summary = "circulation that builds up differently from Wagner's function";
-  e.equation = "phi(s) = 1 - a sum_k A_k exp(-r b_k s)";
+  e.equation = "phi(s) = 1 - (1 - w) sum_k A_k exp(-b_k s) - a_1 exp(-r_1 s) - a_2 exp(-r_2 s)";
   e.kind = "lift";
   e.source = "R. T. Jones, NACA Report 681 (1940)";
-  e.parameters = {{"rate", "1", 1, 0.05, 20, false, "Record a faster step of the angle."}, {"amplitude", "1", 1, 0, 1.9, false, "Record a faster step of the angle."}};
-  e.starts = {Eigen::Vector2d(1, 1), Eigen::Vector2d(0.4, 1), Eigen::Vector2d(2.5, 1)};
-  e.draw = [](const AeroelasticModel&, double, Effect::Random& random) { return log_between(random, {{0.25, 0.9}, {1, 1}}); };
+  e.parameters = {{"replaced_share", "1", 0, -0.9, 2, false, steps},
+                  {"amplitude_1", "1", 0, 0, 2, false, steps},
+                  {"rate_1", "1", 0.1, 0.01, 10, false, steps},
+                  {"amplitude_2", "1", 0, 0, 2, false, steps},
+                  {"rate_2", "1", 0.6, 0.01, 10, false, steps}};
+  e.terms = {{1, 2}, {3, 4}};
+  // All replaced: from a small share the search loses a term to an amplitude of zero, and from there it does not come back.
+  const auto start = [&](double a1, double r1, double a2, double r2) { e.starts.push_back((Eigen::VectorXd(5) << 1, a1, r1, a2, r2).finished()); };
+  start(0.165, 0.0455, 0.335, 0.3);  // Jones' exponentials for the function itself
+  start(0.17, 0.02, 0.33, 0.12);     // which comes later
+  for (const double a1 : {0.1, 0.25})
+    for (const double a2 : {0.1, 0.25}) start(a1, 0.09, a2, 0.55);
+  e.draw = [](const AeroelasticModel&, double, Effect::Random& random) {
+    Eigen::VectorXd p = log_between(random, {{0.03, 1}, {0.05, 0.3}, {0.05, 0.15}, {0.05, 0.3}, {0.3, 0.9}});
+    p[1] *= p[0];
+    p[3] *= p[0];
+    return p;
+  };
+  e.states = [](const AeroelasticModel& model, const Conditions&) -> Eigen::Index { return model.circulation().rate.size() > 0 ? 2 * static_cast<Eigen::Index>(model.rig().submerged.size()) : 0; };
   e.acts_in = "a run in a stream";
   e.acts = [](const Rig&, const Conditions& c) { return c.speed > 0; };
   e.in_the_load = true;
   e.needs = Needs::beam;
   e.apply = [](LinearSystem& system, const EffectContext& c) {
-    const Eigen::Index n = system.states(), first = 2 * system.coordinates, terms = c.model.circulation().rate.size(), parameters = c.theta.size();
-    if (system.lags == 0 || terms == 0) return;
-    const Eigen::Index strips = system.lags / terms;
-    const double r = c.parameter(0), a = c.parameter(1), per_time = c.conditions.speed / c.model.rig().semichord();
-    // What is still missing of the downwash, y - w, stands in the lags' own rows: y' = -rate (y - w).
-    for (DualMatrix* m : {&system.A, &system.C}) {
-      DualMatrix late(Eigen::MatrixXd::Zero(m->rows(), n), parameters), late_inputs(Eigen::MatrixXd::Zero(m->rows(), system.B.cols()), parameters);
-      for (Eigen::Index k = 0; k < terms; ++k) {
-        const Eigen::Index at = first + k * strips;
-        const double scale = -1 / (c.model.circulation().rate[k] * per_time);
-        DualMatrix push = m->block(0, at, m->rows(), strips);
-        if (m == &system.A) {  // the force of the lags, not their own decay
-          push.value.middleRows(first, system.lags).setZero();
-          for (Eigen::MatrixXd& p : push.partial)
-            if (p.size() > 0) p.middleRows(first, system.lags).setZero();
-        }
-        late = late + push * (scale * system.A.block(at, 0, strips, n));
-        late_inputs = late_inputs + push * (scale * system.B.block(at, 0, strips, system.B.cols()));
+    if (system.lags == 0) return;
+    const Eigen::Index terms = c.model.circulation().rate.size(), strips = c.ports.strips, first = 2 * system.coordinates;
+    const Eigen::Index own[] = {append_lag(system, c, c.on_strips(2, c.parameter(2), 1)), append_lag(system, c, c.on_strips(4, c.parameter(4), 1))};
+    const OnStrips w = downwash(system, c);
+    OnStrips wagner{DualMatrix(Eigen::MatrixXd::Zero(strips, system.states()), c.theta.size()), DualMatrix(Eigen::MatrixXd::Zero(strips, system.B.cols()), c.theta.size())};
+    for (Eigen::Index k = 0; k < terms; ++k) {
+      const OnStrips late = missing(w, first + k * strips);
+      const double amplitude = c.model.circulation_amplitude(c.theta, k);
+      OnStrips part{amplitude * late.of_states, amplitude * late.of_inputs};
+      if (const Eigen::Index parameter = c.model.circulation_parameter(k); parameter >= 0) {
+        part.of_states.add_partial(parameter, late.of_states.value);
+        part.of_inputs.add_partial(parameter, late.of_inputs.value);
       }
-      const auto grown = [&](const DualMatrix& whole, const DualMatrix& part) {
-        DualMatrix sum = whole + (a - 1) * part;
-        sum.partial.resize(static_cast<std::size_t>(parameters));
-        sum.add_partial(c.first_parameter + 1, part.value);
-        return sum;
-      };
-      DualMatrix& inputs = m == &system.A ? system.B : system.D;
-      const DualMatrix with_inputs = grown(inputs, late_inputs);
-      *m = grown(*m, late);
-      inputs = with_inputs;
+      wagner = {wagner.of_states + part.of_states, wagner.of_inputs + part.of_inputs};
     }
-    for (DualMatrix* m : {&system.A, &system.B}) {
-      const Eigen::MatrixXd own = m->value.middleRows(first, system.lags);
-      m->value.middleRows(first, system.lags) *= r;
-      for (Eigen::MatrixXd& p : m->partial)
-        if (p.size() > 0) p.middleRows(first, system.lags) *= r;
-      Eigen::MatrixXd change = Eigen::MatrixXd::Zero(m->rows(), m->cols());
-      change.middleRows(first, system.lags) = own;
-      m->add_partial(c.first_parameter, change);
+    const DualMatrix less = c.on_strips(0, -c.parameter(0), -1);
+    OnStrips change{less * wagner.of_states, less * wagner.of_inputs};
+    for (const Eigen::Index i : {0, 1}) {
+      const DualMatrix amplitude = c.on_strips(1 + 2 * i, c.parameter(1 + 2 * i), 1);
+      const OnStrips late = missing(w, own[i]);
+      change = {change.of_states + amplitude * late.of_states, change.of_inputs + amplitude * late.of_inputs};
     }
+    add_circulation(system, c, change);
   };
   return e;
 }

@@ -197,6 +197,13 @@ Trials Selection::try_one_more(const Trial& base, const Strings& hopeless) {
   }
   std::move(followed.begin(), followed.end(), std::back_inserter(linear));
   keep_distinct(linear);
+  try {
+    in_parallel(linear.size(), [&](std::size_t i) {
+      if (leaves_nothing(linear[i]) && !decays_decide(linear[i])) leave_out_terms(linear[i]);
+    });
+  } catch (const OutOfTime&) {  // with all of its terms each stands too
+    stop();
+  }
   std::sort(linear.begin(), linear.end(), [](const Trial& a, const Trial& b) { return bic_difference(a, b) < 0; });
   std::stable_partition(linear.begin(), linear.end(), plausible);
   for (const Trial& t : linear) ranking_.push_back({t.effects, t.reduced_chi2(), bic_difference(t, baseline_), 0, base.effects.empty() ? t.score : 0, search_of(t, base)});

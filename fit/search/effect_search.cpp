@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "core/effects/effect.h"
+#include "core/law/law_effect.h"
 #include "core/numerics/in_parallel.h"
 #include "core/numerics/spectrum.h"
 #include "fit/search/decays_first.h"
@@ -312,6 +313,25 @@ Trial prepare(const FitProblem& problem, const Trial& base, const std::vector<st
 void fit_fully(Trial& trial, int rounds) {
   anneal(trial.arrival, rounds);
   measure(trial);
+}
+
+void leave_out_terms(Trial& trial) {
+  const std::vector<std::string> ids = trial.effects;
+  for (const std::string& id : ids) {
+    const Effect& e = effect(trial.arrival.joint.model().rig(), id);
+    for (const std::vector<Index>& term : e.terms) {
+      Trial fewer = trial;
+      for (Unknown& u : fewer.arrival.joint.unknowns())
+        for (const Index k : term) {
+          if (fewer.arrival.joint.parameter(u).name != id + "." + e.parameters[static_cast<std::size_t>(k)].name) continue;
+          if (k == term.front()) u.value = 0;
+          u.held = true;
+          u.why_held = "These runs are explained as well without its term";
+        }
+      fit_fully(fewer, 2);
+      if (bic_difference(fewer, trial) < 0) trial = std::move(fewer);
+    }
+  }
 }
 
 void follow_finer(Trial& trial, Index times) {

@@ -84,6 +84,9 @@ Arrival arrive_at_effects(const FitProblem& problem);
 /// Fits a prepared trial with everything free, while the weights of the runs return to those of their noise, in so many rounds.
 void fit_fully(Trial& trial, int rounds);
 
+/// Leaves out those terms of its effects (Effect::terms) without which the evidence is no less, held at no amplitude.
+void leave_out_terms(Trial& trial);
+
 /// Follows its nonlinear laws in so many times the steps that they ask for, and fits again.
 void follow_finer(Trial& trial, Eigen::Index times);
 

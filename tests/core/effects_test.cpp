@@ -5,8 +5,10 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
+#include <complex>
 #include <numbers>
 #include <random>
 
@@ -108,31 +110,129 @@ void expect_slope(const MatrixXd& exact, const MatrixXd& slope, const MatrixXd& 
     }
 }
 
+void expect_partials(const AeroelasticModel& model, const VectorXd& theta, const std::string& id) {
+  const Rig& rig = model.rig();
+  const Conditions conditions = conditions_for(rig);
+  const std::vector<std::string> channels = rig.is_modal() ? std::vector<std::string>{"gauge"} : std::vector<std::string>{"gauge", "twist"};
+  const LinearSystem at = model.system(conditions, theta, channels);
+  struct {
+    const char* name;
+    DualMatrix LinearSystem::*matrix;
+  } const matrices[] = {{"A", &LinearSystem::A}, {"B", &LinearSystem::B}, {"C", &LinearSystem::C}, {"D", &LinearSystem::D}};
+  for (const auto& [name, matrix] : matrices)
+    for (Index j = 0; j < theta.size(); ++j) {
+      const double h = step * (theta[j] == 0 ? 1 : std::abs(theta[j]));
+      const auto value = [&](double by) -> MatrixXd {
+        VectorXd there = theta;
+        there[j] += by;
+        return (model.system(conditions, there, channels).*matrix).value;
+      };
+      const DualMatrix& here = at.*matrix;
+      const MatrixXd slope = slope_of(value, h);
+      const MatrixXd exact = here.depends_on(j) ? here.d(j) : MatrixXd::Zero(slope.rows(), slope.cols());
+      expect_slope(exact, slope, here.value, h, id + (rig.is_modal() ? " on modes: " : ": ") + name + " by " + model.parameters()[static_cast<std::size_t>(j)].name);
+    }
+}
+
 TEST(Effects, PartialsOfEveryMatrixAgreeWithSlopes) {
   for (const auto& [e, rig] : cases()) {
     const AeroelasticModel model = model_with(rig, e->id);
-    const VectorXd theta = at_work(model, *e);
-    const Conditions conditions = conditions_for(rig);
-    const std::vector<std::string> channels = rig.is_modal() ? std::vector<std::string>{"gauge"} : std::vector<std::string>{"gauge", "twist"};
-    const LinearSystem at = model.system(conditions, theta, channels);
-    struct {
-      const char* name;
-      DualMatrix LinearSystem::*matrix;
-    } const matrices[] = {{"A", &LinearSystem::A}, {"B", &LinearSystem::B}, {"C", &LinearSystem::C}, {"D", &LinearSystem::D}};
-    for (const auto& [name, matrix] : matrices)
-      for (Index j = 0; j < theta.size(); ++j) {
-        const double h = step * (theta[j] == 0 ? 1 : std::abs(theta[j]));
-        const auto value = [&](double by) -> MatrixXd {
-          VectorXd there = theta;
-          there[j] += by;
-          return (model.system(conditions, there, channels).*matrix).value;
-        };
-        const DualMatrix& here = at.*matrix;
-        const MatrixXd slope = slope_of(value, h);
-        const MatrixXd exact = here.depends_on(j) ? here.d(j) : MatrixXd::Zero(slope.rows(), slope.cols());
-        expect_slope(exact, slope, here.value, h, e->id + (rig.is_modal() ? " on modes: " : ": ") + name + " by " + model.parameters()[static_cast<std::size_t>(j)].name);
-      }
+    expect_partials(model, at_work(model, *e), e->id);
   }
+}
+
+/// What changes the build-up of circulation, where its amplitudes are parameters; and all of these effects beside each other and a carriage that shakes.
+TEST(Effects, PartialsAgreeWithSlopesWhereTheBuildUpIsFree) {
+  const AeroelasticModel free(beam(), make_basis(beam(), Index{3}, Index{1}), wagner(Wagner::jones), AeroelasticModel::Circulation::free);
+  for (const std::vector<std::string>& ids : {std::vector<std::string>{"wagner-lag"}, {"separation-lag"}, {"carriage-vibration", "wagner-lag", "separation-lag"}, {"separation-lag", "wagner-lag"}}) {
+    const AeroelasticModel model = free.with_effects(ids);
+    VectorXd theta = model.start_values();
+    for (double& p : theta)
+      if (p == 0 || p == 1) p = 0.7;
+    expect_partials(model, theta, ids.front());
+  }
+}
+
+/// Circulatory load of a rigid rig, as a share of what Wagner's ends at, s semichords after a step of the downwash: of the normal and the torsional mode and of the gauge.
+VectorXd built_up(const AeroelasticModel& model, const VectorXd& theta, double s) {
+  const Conditions c = conditions_for(beam());
+  const AeroelasticModel bare(model.rig(), model.basis(), model.circulation());
+  const auto loads = [&](const AeroelasticModel& m, const VectorXd& at, bool ended) -> VectorXd {
+    const LinearSystem system = m.system(c, at, {"gauge"});
+    const Index n = system.coordinates, first = 2 * n, others = system.states() - first;
+    VectorXd x = VectorXd::Zero(others);
+    x[system.motion - first] = 1;  // a twist of the shaft, held: w = U
+    const MatrixXd rates = system.A.value.bottomRightCorner(others, others);
+    if (ended) x.head(system.lags).setConstant(c.speed);
+    else x = exponential(DualMatrix(rates * (s * m.rig().semichord() / c.speed))).value * x;
+    VectorXd load(3);
+    load << system.A.value.row(n).tail(others) * x, system.A.value.row(2 * n - 1).tail(others) * x, system.C.value.row(0).tail(others) * x;
+    return load;
+  };
+  return loads(model, theta, false).cwiseQuotient(loads(bare, theta.head(bare.start_values().size()), true));
+}
+
+/// The law that stands in effects.md, whatever comes before it.
+TEST(Effects, TheLoadAfterAStepFollowsTheStatedBuildUp) {
+  constexpr double w = 0.6, a1 = 0.1, r1 = 0.08, a2 = 0.15, r2 = 0.7, loss = 0.3, time = 4;
+  const AeroelasticModel bare(beam(), make_basis(beam(), Index{3}, Index{1}), wagner(Wagner::within_1e4));
+  const auto model_of_both = [&](const std::vector<std::string>& ids) { return bare.with_effects(ids); };
+  const IndicialFunction& own = bare.circulation();
+  for (const double s : {0.0, 0.5, 2.0, 8.0, 40.0}) {
+    const double replaced = 1 - (1 - w) * (1 - own(s)) - a1 * std::exp(-r1 * s) - a2 * std::exp(-r2 * s), lost = loss * (1 - std::exp(-s / time));
+    const auto expect = [&](const std::vector<std::string>& ids, double phi) {
+      const AeroelasticModel model = model_of_both(ids);
+      VectorXd theta = model.start_values();
+      const auto set = [&](const char* name, double value) { theta[model.index(name)] = value; };
+      for (const std::string& id : ids) {
+        if (id == "separation-lag") set("separation-lag.loss", loss), set("separation-lag.time", time);
+        else set("wagner-lag.replaced_share", w), set("wagner-lag.amplitude_1", a1), set("wagner-lag.rate_1", r1), set("wagner-lag.amplitude_2", a2), set("wagner-lag.rate_2", r2);
+      }
+      for (const double share : built_up(model, theta, s)) EXPECT_NEAR(share, phi, 1e-10) << ids.front() << " at " << s << " semichords";
+    };
+    expect({"wagner-lag"}, replaced);
+    expect({"separation-lag"}, own(s) - lost);
+    expect({"wagner-lag", "separation-lag"}, replaced - lost);
+    expect({"separation-lag", "wagner-lag"}, replaced - lost);
+  }
+}
+
+/// At its start values, no amplitude and nothing replaced, it is the unmodified model to the last digit.
+TEST(Effects, ABuildUpOfWhichNothingIsReplacedIsTheModelsOwn) {
+  const AeroelasticModel model = model_with(beam(), "wagner-lag"), bare(beam(), model.basis(), model.circulation());
+  const LinearSystem with = model.system(conditions_for(beam()), model.start_values(), {"gauge"}), without = bare.system(conditions_for(beam()), bare.start_values(), {"gauge"});
+  const Index n = without.states(), added = with.states() - n;
+  EXPECT_EQ(with.A.value.topLeftCorner(n, n), without.A.value);
+  EXPECT_EQ(with.A.value.topRightCorner(n, added), MatrixXd::Zero(n, added));
+  EXPECT_EQ(with.B.value.topRows(n), without.B.value);
+  EXPECT_EQ(with.C.value.leftCols(n), without.C.value);
+  EXPECT_EQ(with.C.value.rightCols(added), MatrixXd::Zero(1, added));
+  EXPECT_EQ(with.D.value, without.D.value);
+}
+
+/// What the gauge reads of a force at 3 Hz.
+std::complex<double> response_to_force(const AeroelasticModel& model, const VectorXd& theta) {
+  const LinearSystem system = model.system(conditions_for(model.rig()), theta, {"gauge"});
+  const Eigen::MatrixXcd at = std::complex<double>(0, 2 * pi * 3) * Eigen::MatrixXcd::Identity(system.states(), system.states()) - system.A.value;
+  return (system.C.value.row(0) * at.partialPivLu().solve(system.B.value.col(0).cast<std::complex<double>>()))(0) + system.D.value(0, 0);
+}
+
+TEST(Effects, ATermWithoutAmplitudeHasNoOtherParameters) {
+  int terms = 0;
+  for (const auto& [e, rig] : cases())
+    for (const std::vector<Index>& term : e->terms) {
+      ++terms;
+      const AeroelasticModel model = model_with(rig, e->id);
+      VectorXd theta = at_work(model, *e);
+      auto own = theta.tail(static_cast<Index>(e->parameters_on(rig).size()));
+      const std::complex<double> whole = response_to_force(model, theta);
+      own[term.front()] = 0;
+      const std::complex<double> without = response_to_force(model, theta);
+      EXPECT_GT(std::abs(whole - without), 1e-6 * std::abs(whole)) << e->id;
+      for (std::size_t k = 1; k < term.size(); ++k) own[term[k]] *= 1.7;
+      EXPECT_LT(std::abs(response_to_force(model, theta) - without), 1e-12 * std::abs(whole)) << e->id;
+    }
+  EXPECT_GT(terms, 0);
 }
 
 /// What drives the states of a signal that wanders: nothing else, and with its partials. There is one, and where it does not act there is no noise.

@@ -138,7 +138,8 @@ TEST(Correct, LeavesWhatBelongsToTheLoadInIt) {
   CorrectProblem problem = null_problem("step_c");
   const CorrectResult plain = correct(problem);
   problem.fit.effects = {"separation-lag", "wagner-lag"};
-  for (const auto& [name, value] : {std::pair{"separation-lag.loss", 0.3}, std::pair{"separation-lag.time", 10.0}, std::pair{"wagner-lag.rate", 2.0}, std::pair{"wagner-lag.amplitude", 0.5}}) {
+  for (const auto& [name, value] : {std::pair{"separation-lag.loss", 0.3}, std::pair{"separation-lag.time", 10.0}, std::pair{"wagner-lag.replaced_share", 1.0},
+                                   std::pair{"wagner-lag.amplitude_1", 0.1}, std::pair{"wagner-lag.rate_1", 0.1}, std::pair{"wagner-lag.amplitude_2", 0.2}, std::pair{"wagner-lag.rate_2", 0.6}}) {
     problem.fit.parameters.emplace_back();
     problem.fit.parameters.back().name = name;
     problem.fit.parameters.back().value = value;

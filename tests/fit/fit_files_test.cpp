@@ -1,5 +1,6 @@
 #include "fit/fit_files.h"
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <filesystem>
@@ -38,6 +39,20 @@ TEST(FitFiles, CarryTheStepsInWhichLawsWereFollowed) {
   json wrong = written(4);
   wrong["law_steps"] = 0;
   EXPECT_THROW(read_back(wrong), InputError);
+}
+
+/// A fit of an earlier version is not taken for one that found nothing.
+TEST(FitFiles, AParameterThatAnEffectNoLongerHasIsRefused) {
+  FitResult earlier;
+  earlier.effects = {"wagner-lag"};
+  earlier.parameters = {{"wagner-lag.rate", "1", "", 0.7, 0.02, 0.7, 0.7, 0, true, ""}};
+  earlier.correlation = Eigen::MatrixXd::Identity(1, 1);
+  try {
+    read_back(json::parse(to_json(earlier)));
+    FAIL() << "accepted";
+  } catch (const InputError& e) {
+    EXPECT_THAT(e.what(), testing::HasSubstr("wagner-lag.rate"));
+  }
 }
 
 TEST(FitFiles, ARunThatWasNotFittedTakesTheSlopeOfTheRunNearestInAngle) {

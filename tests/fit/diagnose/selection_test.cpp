@@ -11,6 +11,7 @@
 #include "fit/trial/trial_campaign.h"
 #include "tests/support/long_tests.h"
 #include "tests/support/sample_data.h"
+#include "tests/support/shared_data.h"
 
 namespace unrig {
 namespace {
@@ -100,6 +101,20 @@ TEST(Selection, AThinBasisDoesNotHideALaw) {
   EXPECT_GT(tried(d, {"coulomb-friction"})->reduced_chi2, 100) << "otherwise friction is found without the modes";
   EXPECT_THAT(found_in(d), UnorderedElementsAre("higher-mode", "coulomb-friction"));
   EXPECT_FALSE(d.unexplained);
+}
+
+/// Three per cent of the build-up are replaced (f5). Its exponentials are below the noise, and cost the explanation nothing: with all five parameters counted a separation would be as good.
+TEST(Selection, AFaintEffectCountsTheTermsThatItNeeds) {
+  UNRIG_NEEDS_SHARED("campaigns/open2");
+  TrialCampaign campaign;
+  const std::string folder = test::shared_path("campaigns/open2/f5/");
+  campaign.rig = read_rig(folder + "rig.toml");
+  for (const char* run : {"dry_pluck", "wet_pluck", "step_a", "step_b", "step_c"}) campaign.runs.push_back(read_run(folder + run + ".csv"));
+  const Diagnosis d = verdict_on(campaign, {"wagner-lag", "separation-lag"});
+  EXPECT_THAT(found_in(d), UnorderedElementsAre("wagner-lag"));
+  EXPECT_THAT(d.equivalent, testing::IsEmpty());
+  ASSERT_TRUE(tried(d, {"wagner-lag"}) && tried(d, {"separation-lag"}));
+  EXPECT_LT(tried(d, {"wagner-lag"})->delta_bic, tried(d, {"separation-lag"})->delta_bic - 10);
 }
 
 /// A friction of 544 times the noise, and hum below it: what following the friction in whole samples leaves had got a slower build-up and a separation, until finer steps left less and the rest no name.
