@@ -17,6 +17,7 @@
 #include "fit/effect_option.h"
 #include "fit/fit.h"
 #include "fit/fit_files.h"
+#include "fit/fit_report.h"
 #include "fit/givens/price.h"
 
 namespace unrig {

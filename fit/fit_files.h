@@ -72,7 +72,4 @@ void check_is_fit_of(const AeroelasticModel& model, const FittedRig& fit, const 
 /// fitted run that began at the angle nearest to `onset_angle`, because the slope falls towards stall; without that angle, the mean of the fitted slopes.
 Eigen::VectorXd theta_for(const AeroelasticModel& model, const FittedRig& fit, const std::string& run_file, double onset_angle = std::numeric_limits<double>::quiet_NaN());
 
-/// Text report: statistics, variables with error, percentage and start value, correlations of at least `least`, runs.
-std::string report(const FitResult& result, double least = 0.1);
-
 }  // namespace unrig

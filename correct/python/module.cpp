@@ -43,6 +43,7 @@
 #include "fit/effect_option.h"
 #include "fit/fit.h"
 #include "fit/fit_files.h"
+#include "fit/fit_report.h"
 #include "fit/fit_json.h"
 
 namespace py = pybind11;

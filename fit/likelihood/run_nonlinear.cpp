@@ -195,7 +195,7 @@ VectorXd RunResidual::as_the_angle_says() const {
 /// all and the law has turned the trajectory once at most. The least chi-squares of a motion are many: smaller strides lead to others.
 RunResidual::NonlinearPoint RunResidual::along_growing_record(const Linearised& lin, const VectorXd& theta, NonlinearPoint point) const {
   constexpr double growth = 1.3, small = 1.1, followed = 1.5, lost = 4;
-  const bool moves = motion_.unknowns() > 0, has_corners = moves && takes_small_steps(theta);
+  const bool moves = motion_.unknowns() > 0;  // under a law with corners: elsewhere a motion is led in (fit/search/find_motion.h)
   constexpr Index hardly_moved = 20;
   constexpr int on_the_way = 10;  // steps: each part begins near where the one before it ended
   const Index before = moves ? motion_.active().front().first : 0, first = before + (moves ? hardly_moved : 2 * unknowns_);
@@ -207,11 +207,11 @@ RunResidual::NonlinearPoint RunResidual::along_growing_record(const Linearised& 
     part_lin.step = lin.step;
     NonlinearPoint at = point;
     for (part.last_sample_ = std::min(last_sample_, first); part.last_sample_ < last_sample_;) {
-      part.search_along_tangents(part_lin, theta, part.nonlinear_point(lin, theta, at.linear), has_corners ? on_the_way : part.most_steps());
+      part.search_along_tangents(part_lin, theta, part.nonlinear_point(lin, theta, at.linear), moves ? on_the_way : part.most_steps());
       if (!std::isfinite(part_lin.chi2)) return at;
       at.linear = part_lin.linear;
       const double noise = static_cast<double>((measured_.cols() + 1) * part.last_sample_) / (tempered_ * tempered_);
-      if (has_corners && part_lin.chi2 > lost * noise) break;  // nothing further on leads back
+      if (moves && part_lin.chi2 > lost * noise) break;  // nothing further on leads back
       part.last_sample_ = std::min(last_sample_, before + static_cast<Index>(stride * static_cast<double>(part.last_sample_ - before)) + 1);
     }
     return nonlinear_point(lin, theta, at.linear);

@@ -215,8 +215,8 @@ class RunResidual {
   }
   Eigen::Index finer() const { return finer_; }
 
-  /// Moves c of a nonlinear run with prescribed motion to the least chi-square that exact tangents reach over a record that grows, at theta. For laws with corners that
-  /// the rig crosses all the time (freeplay), or that it leaves and meets again (friction); `thoroughly`: in smaller strides too where that does not follow the run, which at this
+  /// Moves c of a nonlinear run to the least chi-square that exact tangents reach over a record that grows, at theta. For decays, and for laws with
+  /// corners that the rig crosses all the time (freeplay); `thoroughly`: in smaller strides too where that does not follow the run, which at this
   /// theta it should. False, and nothing done, where the model is linear.
   bool find_linear(const Eigen::VectorXd& theta, bool thoroughly = false);
   /// Whether following the model takes several steps a sample, which makes exact tangents dear.

@@ -16,7 +16,7 @@ void lead_in(RunResidual& run, const Eigen::VectorXd& theta, const std::function
 
 /// Searches the linear unknowns c of a run under nonlinear laws from afar, at theta. Leaves the best found as where the run's next search begins; false where the model is linear.
 /// Under laws with corners that ask for small steps, and of a free decay, c is searched over a part of the record that grows (RunResidual::find_linear, also for `thoroughly`): a gap
-/// (open2/a3) is followed better so, in a fifth of the time. Elsewhere by `lead_in`.
+/// (open2/a3) is followed better so, in a quarter of the time. Elsewhere by `lead_in`.
 bool find_motion(RunResidual& run, const Eigen::VectorXd& theta, bool thoroughly = false);
 
 }  // namespace unrig

@@ -27,7 +27,7 @@ JointProblem fitted_alone(const JointProblem& joint, std::size_t r) {
   for (int round = 0; round < rounds; ++round) {
     alone.solve(options);
     if (alone.chi2() < enough) break;
-    JointProblem other = alone;  // the motion once more from its beginning, as it leads there with these values
+    JointProblem other = alone;  // the motion once more from afar
     if (RunResidual& run = other.runs().front(); run.takes_small_steps(other.theta(0))) find_motion(run, other.theta(0), true);
     else lead_in(run, other.theta(0), [&] { other.solve(options); });
     if (!(other.chi2() < alone.chi2())) break;

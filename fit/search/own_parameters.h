@@ -3,8 +3,8 @@
 
 namespace unrig {
 
-/// Runs whose motion is estimated, under a law with corners: the parameters that a run has of its own (the slope of its normal force) are searched for run by run, what all share held, until its
-/// gauge is explained. Small errors of them turn a trajectory at a corner that the true one misses, and no search of everything at once leads back from there.
+/// Runs whose motion is estimated, under a nonlinear law: the parameters that a run has of its own (the slope of its normal force) are searched for run by run, what all share held, until its
+/// gauge is explained. Small errors of them turn a trajectory where the true one passes, and no search of everything at once leads back from there.
 void fit_own_parameters(JointProblem& joint);
 
 }  // namespace unrig

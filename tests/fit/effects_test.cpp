@@ -98,7 +98,7 @@ TEST(FittedEffects, TheBuildUpOfCirculationIsRecovered) {
         variance += slope[i] * slope[k] * result.correlation(at[i], at[k]) * result.parameters[static_cast<std::size_t>(at[i])].std_error * result.parameters[static_cast<std::size_t>(at[k])].std_error;
     const double error = std::sqrt(variance);
     EXPECT_LT(std::abs(phi - expected), 3 * error) << s << " semichords: " << phi << ", truth " << expected;
-    EXPECT_LT(error, 0.002) << s << " semichords";
+    EXPECT_LT(error, 0.1 * std::abs(expected - own(s))) << s << " semichords: small beside what is off Wagner's";
   }
 }
 

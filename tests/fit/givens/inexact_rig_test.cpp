@@ -12,6 +12,7 @@
 #include "core/files/text_file.h"
 #include "fit/fit.h"
 #include "fit/fit_files.h"
+#include "fit/fit_report.h"
 #include "fit/givens/price.h"
 #include "tests/support/sample_data.h"
 #include "tests/support/stated.h"
