@@ -273,7 +273,26 @@ std::vector<VectorXd> starts_of(JointProblem& joint, const Effect& e, bool astra
   return largest > 0 ? e.starts_for(joint.model(), largest) : e.starts;
 }
 
-/// The best of each effect's starts, by chi-square with the linear unknowns following; never none of it, from where it may have no slope.
+/// The start from which some iterations leave the least chi-square, and where they end. What a start leaves before them tells little: it favours the one at which an effect does least.
+/// Where motions are estimated too the iterations are dear, and the search goes through the decays first (fit/search/decays_first.h): there the start of least chi-square, as it is.
+JointProblem best_of(std::vector<JointProblem> starts) {
+  if (starts.size() == 1) return std::move(starts.front());
+  const std::vector<RunResidual>& runs = starts.front().runs();
+  const bool with_motions = std::any_of(runs.begin(), runs.end(), [](const RunResidual& run) { return run.motion().unknowns() > 0; });
+  std::vector<double> left(starts.size());
+  in_parallel(starts.size(), [&](std::size_t i) {
+    JointProblem::SolveOptions options;
+    options.iterations = 8;
+    options.most_evaluations = 12;
+    options.tolerance = 1e-2;
+    if (!with_motions) starts[i].solve(options);
+    left[i] = starts[i].chi2();
+    if (!std::isfinite(left[i])) left[i] = std::numeric_limits<double>::max();
+  });
+  return std::move(starts[static_cast<std::size_t>(std::min_element(left.begin(), left.end()) - left.begin())]);
+}
+
+/// The best of each effect's starts; never none of it, from where it may have no slope.
 void choose_effect_starts(Arrival& arrival, const FitProblem& problem, const std::vector<std::string>& added) {
   JointProblem at_the_rig = arrival.joint;
   constexpr double astray = 10;  // what a rig moves by there says nothing of the size of a force
@@ -283,23 +302,18 @@ void choose_effect_starts(Arrival& arrival, const FitProblem& problem, const std
   for (const std::string& id : added) {
     tell(problem, "looking for " + id);
     const auto& parameters = effect(problem.rig, id).parameters_on(arrival.joint.model().rig());
-    const auto set = [&](JointProblem& joint, const VectorXd& values) {
-      for (Unknown* u : unknowns_of(joint, id))
+    std::vector<JointProblem> starts;
+    for (const VectorXd& start : starts_of(judge, effect(problem.rig, id), lost)) {
+      starts.push_back(judge);
+      for (Unknown* u : unknowns_of(starts.back(), id))
         for (std::size_t k = 0; k < parameters.size(); ++k)
-          if (joint.parameter(*u).name == id + "." + parameters[k].name) u->value = values[static_cast<Index>(k)];
-    };
-    const std::vector<VectorXd> starts = starts_of(judge, effect(problem.rig, id), lost);
-    const VectorXd* best = nullptr;
-    double least = std::numeric_limits<double>::infinity();
-    for (const VectorXd& start : starts) {
-      set(judge, start);
-      const double chi2 = starts.size() > 1 ? judge.chi2() : 0;
-      if (chi2 < least || !best) best = &start;
-      least = std::min(least, chi2);
+          if (judge.parameter(*u).name == id + "." + parameters[k].name) u->value = start[static_cast<Index>(k)];
     }
-    if (!best) continue;
-    set(judge, *best);
-    set(arrival.joint, *best);
+    if (starts.empty()) continue;
+    judge = best_of(std::move(starts));
+    if (!lost) continue;
+    const std::vector<Unknown*> own = unknowns_of(arrival.joint, id), found = unknowns_of(judge, id);
+    for (std::size_t k = 0; k < own.size(); ++k) own[k]->value = found[k]->value;
   }
   set_starts(arrival.joint, problem.start);
 }

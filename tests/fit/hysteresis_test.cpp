@@ -51,11 +51,13 @@ const FittedParameter& parameter(const FitResult& result, const std::string& nam
   return result.parameters.front();
 }
 
-TEST(Hysteresis, IsFittedByName) {
+class Hysteresis : public testing::TestWithParam<unsigned> {};
+
+TEST_P(Hysteresis, IsFittedByName) {
   const Truth truth;
   constexpr double dt = 2e-3, noise = 2e-5;
   constexpr Index samples = 6000;
-  std::mt19937_64 random(7);
+  std::mt19937_64 random(GetParam());
   std::uniform_real_distribution<double> phase(0, 2 * pi);
   VectorXd force = VectorXd::Zero(samples);
   for (int line = 1; line <= 60; ++line) {  // 0.2 to 12 Hz
@@ -94,6 +96,7 @@ TEST(Hysteresis, IsFittedByName) {
   near("bouc-wen.shape", truth.shape);
   near("bouc-wen.sharpness", truth.sharpness);
 }
+INSTANTIATE_TEST_SUITE_P(Forces, Hysteresis, testing::Values(1, 6, 7));  // from 1 and 6 the start of least chi-square loses its way
 
 }  // namespace
 }  // namespace unrig
