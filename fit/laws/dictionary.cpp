@@ -57,7 +57,7 @@ std::vector<Line> lines() {
       {"spring with the speed squared", ActsOn::normal, "-c * x * v^2", "", {either}, {x, v}},
       {"dry friction", ActsOn::normal, "-f * tanh(v / s)", "", {{"f", In::force, {little}, 0}, {"s", In::v, {0.02}, 1e-3, 2}}, {}},
       {"friction of Stribeck", ActsOn::normal, "-f * (1 + r * exp(-abs(v) / s)) * tanh(v / (0.1 * s))", "", {{"f", In::force, {little}, 0}, {"r", In::number, {0.3}, -1, 10}, {"s", In::v, {0.05}, 5e-3, 2}}, {}},
-      {"hysteresis of Bouc and Wen", ActsOn::normal, "-f * z", "v / xy * (1 - abs(z)^n * (b + (1 - b) * sign(v * z)))", {{"f", In::force, {more}, 0}, {"xy", In::x, {0.2, 0.05}, 1e-3, 3}, {"b", In::number, {0.5}, 0, 1}, {"n", In::number, {1}, 0.5, 4}}, {}},
+      {"hysteresis of Bouc and Wen", ActsOn::normal, "-f * z", "v / xy * (1 - abs(z)^n * (b + (1 - abs(b)) * sign(v * z)))", {{"f", In::force, {more}, 0}, {"xy", In::x, {0.2, 0.05}, 1e-3, 3}, {"b", In::number, {0.5}, -1, 1}, {"n", In::number, {1}, 0.5, 4}}, {}},
       {"spring and damper in series", ActsOn::normal, "-f * z", "v - z / tau", {{"f", In::force, {10 * more}, 0}, {"tau", In::seconds, {0.01, 0.1}, 1e-4, 1}}, {v}},
       {"stiffness that changes with time", ActsOn::normal, "-c * x * (1 - exp(-t / tau))", "", {either, {"tau", In::seconds, {0.1, 0.5}, 0.003, 30}}, {x}},
       {"damping that changes with time", ActsOn::normal, "-c * v * (1 - exp(-t / tau))", "", {either, {"tau", In::seconds, {0.1, 0.5}, 0.003, 30}}, {v}},

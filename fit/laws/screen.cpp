@@ -48,7 +48,9 @@ std::vector<Column> shapes_of(const std::vector<Form>& forms, ActsOn place) {
       if (std::find(linear.begin(), linear.end(), static_cast<Index>(k)) != linear.end()) continue;
       const Parameter& p = law.parameters[k];
       std::vector<double> values;
+      if (law.memory && p.name == "n") continue;  // of hysteresis the corner and the loop's shape
       if (p.name == "p") values = {0.5, 1.5, 2, 2.5, 3, 4, 5};
+      else if (law.memory && p.name == "b") values = {-0.6, -0.3, 0, 0.5};
       else
         for (const double factor : {0.2, 0.5, 1.0, 2.0, 4.0}) values.push_back(factor * shapes.front()[static_cast<Index>(k)]);
       std::vector<VectorXd> each;
@@ -58,7 +60,6 @@ std::vector<Column> shapes_of(const std::vector<Form>& forms, ActsOn place) {
             shape[static_cast<Index>(k)] = value;
             each.push_back(std::move(shape));
           }
-      if (law.memory && (p.name == "b" || p.name == "n")) continue;  // of hysteresis only the corner
       shapes = std::move(each);
     }
     for (VectorXd& shape : shapes) all.push_back({f, std::move(shape), linear});

@@ -273,27 +273,38 @@ std::vector<VectorXd> starts_of(JointProblem& joint, const Effect& e, bool astra
   return largest > 0 ? e.starts_for(joint.model(), largest) : e.starts;
 }
 
-/// The start from which some iterations leave the least chi-square, and where they end. What a start leaves before them tells little: it favours the one at which an effect does least.
-/// Where motions are estimated too the iterations are dear, and the search goes through the decays first (fit/search/decays_first.h): there the start of least chi-square, as it is.
-JointProblem best_of(std::vector<JointProblem> starts) {
-  if (starts.size() == 1) return std::move(starts.front());
+/// Which of these starts, and where it leads: to where some iterations end, if that halves the chi-square `without` the effect, and to the best as it is if not. What starts leave as they are
+/// favours the one at which an effect does least. Where motions are estimated too iterations are dear, and the search goes through the decays first (fit/search/decays_first.h).
+JointProblem best_of(const std::vector<JointProblem>& starts, double without) {
+  if (starts.size() == 1) return starts.front();
   const std::vector<RunResidual>& runs = starts.front().runs();
   const bool with_motions = std::any_of(runs.begin(), runs.end(), [](const RunResidual& run) { return run.motion().unknowns() > 0; });
-  std::vector<double> left(starts.size());
-  in_parallel(starts.size(), [&](std::size_t i) {
+  const auto least = [](const std::vector<JointProblem>& joints) {
+    std::vector<double> left(joints.size());
+    in_parallel(joints.size(), [&](std::size_t i) {
+      left[i] = joints[i].chi2();
+      if (!std::isfinite(left[i])) left[i] = std::numeric_limits<double>::max();
+    });
+    const auto best = std::min_element(left.begin(), left.end());
+    return std::pair(*best, static_cast<std::size_t>(best - left.begin()));
+  };
+  const std::size_t start = least(starts).second;
+  if (with_motions) return starts[start];
+  std::vector<JointProblem> solved = starts;
+  in_parallel(solved.size(), [&](std::size_t i) {
     JointProblem::SolveOptions options;
     options.iterations = 8;
     options.most_evaluations = 12;
     options.tolerance = 1e-2;
-    if (!with_motions) starts[i].solve(options);
-    left[i] = starts[i].chi2();
-    if (!std::isfinite(left[i])) left[i] = std::numeric_limits<double>::max();
+    solved[i].solve(options);
   });
-  return std::move(starts[static_cast<std::size_t>(std::min_element(left.begin(), left.end()) - left.begin())]);
+  const auto [left, end] = least(solved);
+  constexpr double worth_it = 0.5;
+  return left < worth_it * without ? solved[end] : starts[start];
 }
 
 /// The best of each effect's starts; never none of it, from where it may have no slope.
-void choose_effect_starts(Arrival& arrival, const FitProblem& problem, const std::vector<std::string>& added) {
+void choose_effect_starts(Arrival& arrival, const FitProblem& problem, const std::vector<std::string>& added, double without) {
   JointProblem at_the_rig = arrival.joint;
   constexpr double astray = 10;  // what a rig moves by there says nothing of the size of a force
   const bool lost = back_to_the_rig(at_the_rig, astray);
@@ -310,7 +321,7 @@ void choose_effect_starts(Arrival& arrival, const FitProblem& problem, const std
           if (judge.parameter(*u).name == id + "." + parameters[k].name) u->value = start[static_cast<Index>(k)];
     }
     if (starts.empty()) continue;
-    judge = best_of(std::move(starts));
+    judge = best_of(starts, without);
     if (!lost) continue;
     const std::vector<Unknown*> own = unknowns_of(arrival.joint, id), found = unknowns_of(judge, id);
     for (std::size_t k = 0; k < own.size(); ++k) own[k]->value = found[k]->value;
@@ -416,7 +427,7 @@ Arrival extend(const FitProblem& problem, const Arrival& without, const std::sha
     run.set_aside(known.is_aside() && run.takes_small_steps(anywhere));
   }
   for (RunResidual& run : arrival.joint.runs()) run.glance(true);
-  choose_effect_starts(arrival, problem, added);
+  choose_effect_starts(arrival, problem, added, without.joint.chi2());
   hold_undetermined(arrival.joint);
   for (RunResidual& run : arrival.joint.runs()) run.glance(false);
   return arrival;

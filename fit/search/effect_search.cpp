@@ -425,8 +425,13 @@ Arrival arrive_at_effects(const FitProblem& problem) {
     std::vector<std::string> at_work = best.effects;
     at_work.insert(at_work.end(), added.begin(), added.end());
     Trial trial = prepare(problem, best, at_work);
-    if (nonlinear(trial)) follow_nonlinear(trial, best, best.reduced_chi2());
-    else fit_fully(trial, 2);
+    if (!nonlinear(trial)) {
+      fit_fully(trial, 2);
+    } else if (Trial followed = trial; follow_nonlinear(followed, best, best.reduced_chi2())) {
+      trial = std::move(followed);
+    } else {
+      measure(trial);  // where the law's size went astray it is sought again from where it started
+    }
     best = std::move(trial);
   }
   if (leaves_nothing(best) || decays_decide(best)) return best.arrival;
