@@ -15,22 +15,18 @@
 
 #include "core/files/text_file.h"
 #include "tests/commands/run_unrig.h"
+#include "tests/support/replaced.h"
 #include "tests/support/sample_data.h"
 
 namespace unrig {
 namespace {
 
 using test::Finished;
-using test::run_unrig;
 using test::TemporaryDirectory;
+using test::replaced;
+using test::run_unrig;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
-
-std::string replaced(std::string text, const std::string& what, const std::string& by) {
-  const auto at = text.find(what);
-  EXPECT_NE(at, std::string::npos) << what;
-  return at == std::string::npos ? text : text.replace(at, what.size(), by);
-}
 
 std::vector<std::string> lines_of(const std::string& text) {
   std::vector<std::string> lines;

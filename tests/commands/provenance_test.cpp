@@ -13,6 +13,7 @@
 #include "core/rig/fingerprint.h"
 #include "core/files/text_file.h"
 #include "tests/commands/run_unrig.h"
+#include "tests/support/replaced.h"
 #include "tests/support/sample_data.h"
 
 namespace unrig {
@@ -20,19 +21,14 @@ namespace {
 
 using nlohmann::json;
 using test::Finished;
-using test::null_campaign;
-using test::run_unrig;
 using test::TemporaryDirectory;
+using test::null_campaign;
+using test::replaced;
+using test::run_unrig;
 using ::testing::AllOf;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 using ::testing::Not;
-
-std::string replaced(std::string text, const std::string& what, const std::string& with) {
-  const std::size_t at = text.find(what);
-  EXPECT_NE(at, std::string::npos) << what;
-  return at == std::string::npos ? text : text.replace(at, what.size(), with);
-}
 
 /// The name of the last column: what made the table.
 std::string made_by(const std::string& file) { return read_csv(read_text(file), 1, file).columns.back().name; }

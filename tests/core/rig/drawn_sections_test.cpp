@@ -14,6 +14,7 @@
 #include "core/rig/givens.h"
 #include "core/rig/rig.h"
 #include "core/rig/structure.h"
+#include "tests/support/replaced.h"
 #include "tests/support/temporary_directory.h"
 
 namespace unrig {
@@ -22,6 +23,7 @@ namespace {
 using Eigen::Index;
 using Eigen::VectorXd;
 using test::TemporaryDirectory;
+using test::replaced;
 using ::testing::AllOf;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
@@ -69,12 +71,6 @@ std::string refusal(const std::string& text) {
     return error.what();
   }
   return "no error";
-}
-
-std::string replaced(std::string text, const std::string& what, const std::string& by) {
-  const auto at = text.find(what);
-  EXPECT_NE(at, std::string::npos) << what;
-  return text.replace(at, what.size(), by);
 }
 
 TEST(RigOfSections, MassInertiaAndFlexibilityFollowFromTheDimensions) {

@@ -9,6 +9,7 @@
 
 #include "core/rig/beam_flexibility.h"
 #include "core/files/text_file.h"
+#include "tests/support/replaced.h"
 #include "tests/support/sample_data.h"
 #include "tests/support/temporary_directory.h"
 
@@ -18,6 +19,7 @@ namespace {
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 using test::TemporaryDirectory;
+using test::replaced;
 using ::testing::AllOf;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
@@ -137,12 +139,6 @@ std::string refusal(const std::string& text) {
     return error.what();
   }
   return "no error";
-}
-
-std::string replaced(std::string text, const std::string& what, const std::string& by) {
-  const auto at = text.find(what);
-  EXPECT_NE(at, std::string::npos) << what;
-  return text.replace(at, what.size(), by);
 }
 
 /// The text without the lines from the one that holds `from` to the one before that which holds `to`.
