@@ -32,8 +32,8 @@ double first_frequency(const AeroelasticModel& model) {
 
 /// Hysteresis of the rig in its fundamental mode: F = -F_y z on the coordinate of the first normal mode, scaled to the element that the dead weights hung at,
 /// z' = v/x_y (1 - |z|^n (b + (1 - |b|) sign(v z))), v [m/s] what that mode moves it by, z = 0 where a run begins. Small motions feel a spring of stiffness F_y/x_y.
-/// With b >= 0 large motions feel dry friction F_y [N] and |z| stays below 1; x_y [m] lies between, n >= 1/2 is how sharply. With b < 0 the loop grows with the motion: without bound
-/// from b = -1/2 down, where the law stiffens. It is elastic at b = 1 and b = -1, and dissipates most at b = 0.
+/// With b >= 0 large motions feel dry friction F_y [N] and |z| stays below 1; x_y [m] lies between, n >= 1/2 is how sharply. With b < 0 the loop grows on: |z| stays below
+/// (1 + 2 b)^(-1/n), from b = -1/2 down it has no bound. It is elastic at b = 1 and b = -1.
 /// For a rig known only as modes, the first mode's coordinate.
 /// Source: Y.-K. Wen, J. Engineering Mechanics 102 (1976) 249, Eq. 3, with A = 1, beta = b, gamma = 1 - |b|; bounds: F. Ikhouane and J. Rodellar, Systems with Hysteresis (2007), ch. 2.
 Effect bouc_wen() {

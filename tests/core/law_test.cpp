@@ -178,7 +178,7 @@ const std::string hysteresis = R"toml(unrig_law = 1
 name = "hysteresis"
 acts_on = "normal"
 force = "-f * z"
-memory = "v / xy * (1 - (b + (1 - b) * sign(v * z)) * abs(z)^n)"
+memory = "v / xy * (1 - (b + (1 - abs(b)) * sign(v * z)) * abs(z)^n)"
 [parameters]
 f = { start = "1 N", lower = "0 N" }
 xy = { start = "1 mm", lower = "1e-6 m" }
@@ -239,19 +239,21 @@ TEST(LawEffect, IsWhatTheCompiledEffectIs) {
 TEST(LawEffect, MemoryHasTheRateOfTheCompiledOne) {
   const AeroelasticModel law = beam({hysteresis}), effect = beam({}, {"bouc-wen"});
   VectorXd theta = law.start_values();
-  theta.tail(4) << 8, 2e-3, 0.4, 1.3;
-  const LinearSystem a = law.system(stream(), theta, {"gauge"}), b = effect.system(stream(), theta, {"gauge"});
-  EXPECT_EQ((a.A.value - b.A.value).norm(), 0);
-  EXPECT_EQ((a.C.value - b.C.value).norm(), 0);
-  std::mt19937 random(3);
-  std::uniform_real_distribution<double> any(-1, 1);
-  for (int k = 0; k < 200; ++k) {
-    const double z[] = {k % 7 == 0 ? 0 : 0.1 * any(random), k % 5 == 0 ? 0 : any(random)};
-    const FeedbackForce left = force_of(a.feedback.at(0), z, theta), right = force_of(b.feedback.at(0), z, theta);
-    const auto near = [&](double x, double y) { EXPECT_NEAR(x, y, 1e-10 * std::max(1.0, std::abs(y))) << z[0] << " " << z[1]; };
-    near(left.value, right.value);
-    for (std::size_t i = 0; i < 2; ++i) near(left.slope[i], right.slope[i]);
-    for (std::size_t i = 0; i < 4; ++i) near(left.partial[i], right.partial[i]);
+  for (const double shape : {0.4, -0.6}) {
+    theta.tail(4) << 8, 2e-3, shape, 1.3;
+    const LinearSystem a = law.system(stream(), theta, {"gauge"}), b = effect.system(stream(), theta, {"gauge"});
+    EXPECT_EQ((a.A.value - b.A.value).norm(), 0);
+    EXPECT_EQ((a.C.value - b.C.value).norm(), 0);
+    std::mt19937 random(3);
+    std::uniform_real_distribution<double> any(-1, 1);
+    for (int k = 0; k < 200; ++k) {
+      const double z[] = {k % 7 == 0 ? 0 : 0.1 * any(random), k % 5 == 0 ? 0 : any(random)};
+      const FeedbackForce left = force_of(a.feedback.at(0), z, theta), right = force_of(b.feedback.at(0), z, theta);
+      const auto near = [&](double x, double y) { EXPECT_NEAR(x, y, 1e-10 * std::max(1.0, std::abs(y))) << z[0] << " " << z[1]; };
+      near(left.value, right.value);
+      for (std::size_t i = 0; i < 2; ++i) near(left.slope[i], right.slope[i]);
+      for (std::size_t i = 0; i < 4; ++i) near(left.partial[i], right.partial[i]);
+    }
   }
 }
 
