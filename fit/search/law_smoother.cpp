@@ -36,10 +36,12 @@ void triangularise(Eigen::Ref<MatrixXd> rows, Index pivots) {
 
 }  // namespace
 
-LawSmoother::LawSmoother(const RunResidual& run, std::vector<Index> parameters) : run_(run), parameters_(std::move(parameters)), inputs_(run_inputs(run.run(), run.conditions())), free_(run.free_states()) {
+LawSmoother::LawSmoother(const RunResidual& run, std::vector<Index> parameters) : run_(run), parameters_(std::move(parameters)), inputs_(run_inputs(run.run(), run.conditions())) {
   const std::vector<std::string> names = run.model().output_channels(run.run());
   const LinearSystem first = run.model().system(run.conditions(), run.model().start_values(), names);
   for (const Feedback& f : first.feedback) parts_ = std::max(parts_, std::min(most_parts, f.steps_per_sample));
+  for (const Index state : run.free_states())
+    if (state < first.states()) free_.push_back(state);  // behind them those of its noise's colour
   readings_ = std::min(run.run().samples(), most_samples);
   samples_ = (readings_ - 1) * parts_ + 1;
   channels_ = static_cast<Index>(names.size());
@@ -50,7 +52,7 @@ LawSmoother::LawSmoother(const RunResidual& run, std::vector<Index> parameters) 
     const VectorXd weight = run.channel_weight(static_cast<std::size_t>(c));
     for (Index k = 0; k < readings_; ++k)
       if (weight[k] > 0) {
-        weight_(k * parts_, c) = weight[k];
+        weight_(k * parts_, c) = 1 / (run.tempered() * run.noise(static_cast<std::size_t>(c)));  // of all colours, taken for white
         measured_(k * parts_, c) = value[k];
       }
   }
@@ -287,7 +289,7 @@ double LawSmoother::cost(const VectorXd& sigma) const {
 VectorXd LawSmoother::disturbance() const { return (disturbance_.rowwise().squaredNorm() / static_cast<double>(disturbance_.cols())).cwiseSqrt(); }
 
 VectorXd LawSmoother::linear() const {
-  VectorXd c(static_cast<Index>(free_.size()) + channels_);
+  VectorXd c = VectorXd::Zero(static_cast<Index>(run_.free_states().size()) + channels_);
   for (std::size_t i = 0; i < free_.size(); ++i) c[static_cast<Index>(i)] = state_(free_[i], 0);
   c.tail(channels_) = offset_;
   return c;

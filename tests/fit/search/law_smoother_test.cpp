@@ -68,5 +68,24 @@ TEST_F(LawSmootherOfAPluck, TrustedLawsGiveTheModelsOwnTrajectory) {
   EXPECT_LT((smoother.linear() - own.linear).norm(), 1e-4 * own.linear.norm());
 }
 
+TEST_F(LawSmootherOfAPluck, NoiseOfAColourIsTakenForWhite) {
+  const VectorXd theta = model.start_values();
+  const double variance = residual.noise(0) * residual.noise(0);
+  RunResidual coloured = residual;
+  coloured.set_colours(theta, RunResidual::Colours(residual.channels().size(), NoiseColour{VectorXd::Constant(1, 8.0), VectorXd::Constant(1, 0.75 * variance), 0.25 * variance}));
+  ASSERT_GT(coloured.linear_unknowns(), residual.linear_unknowns()) << "the noise has states of its own";
+  LawSmoother white(residual, searched), smoother(coloured, searched);
+  const VectorXd sigma = white.enough_to_move(theta);
+  const auto count = static_cast<Index>(searched.size());
+  smoother.enough_to_move(theta);
+  EXPECT_DOUBLE_EQ(least(smoother, theta, sigma, count), least(white, theta, sigma, count));
+  const VectorXd known = smoother.linear(), own = white.linear();
+  ASSERT_EQ(known.size(), coloured.linear_unknowns());
+  const Index channels = static_cast<Index>(residual.channels().size()), states = own.size() - channels;
+  EXPECT_EQ(known.head(states), own.head(states));
+  EXPECT_EQ(known.tail(channels), own.tail(channels));
+  EXPECT_TRUE(known.segment(states, known.size() - own.size()).isZero(0));
+}
+
 }  // namespace
 }  // namespace unrig
