@@ -138,7 +138,7 @@ Index append_lag(LinearSystem& system, const EffectContext& c, const DualMatrix&
   return lag;
 }
 
-void add_circulation(LinearSystem& system, const EffectContext& c, const OnStrips& change) {
+DualMatrix circulation_ports(const LinearSystem& system, const EffectContext& c) {
   const Rig& rig = c.model.rig();
   const double b = rig.semichord(), strength = c.conditions.density * c.conditions.speed * b * rig.strip_length;
   // By the ports: where the share of Wagner's function is replaced, the columns of its lags no longer tell what circulation does.
@@ -150,7 +150,11 @@ void add_circulation(LinearSystem& system, const EffectContext& c, const OnStrip
   const Index slope = c.model.index("normal_force_slope");
   DualMatrix direction(c.theta[slope] * strength * at_quarter_chord, c.theta.size());
   direction.add_partial(slope, strength * at_quarter_chord);
-  const DualMatrix push = system.B * direction, direct = system.D * direction;
+  return direction;
+}
+
+void add_circulation(LinearSystem& system, const EffectContext& c, const OnStrips& change) {
+  const DualMatrix direction = circulation_ports(system, c), push = system.B * direction, direct = system.D * direction;
   system.A = system.A + push * change.of_states;
   system.B = system.B + push * change.of_inputs;
   system.C = system.C + direct * change.of_states;

@@ -128,6 +128,8 @@ struct OnStrips {
 OnStrips downwash(const LinearSystem& system, const EffectContext& context);
 /// A lag of the downwash on each strip, y' = r (U/b) (w - y), at rest where the rig is. `rate`: r [1/semichord] on the strips. Returns the index of the first strip's y.
 Eigen::Index append_lag(LinearSystem& system, const EffectContext& context, const DualMatrix& rate);
+/// What a downwash of 1 m/s on each strip does in the end, s rho U b l at quarter chord: over all input columns x strips; s the slope of the run's normal force.
+DualMatrix circulation_ports(const LinearSystem& system, const EffectContext& context);
 /// The circulatory force on each strip grows by s rho U b l times `change` [m/s], at quarter chord; s the slope of the run's normal force.
 void add_circulation(LinearSystem& system, const EffectContext& context, const OnStrips& change);
 

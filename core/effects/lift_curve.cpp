@@ -1,5 +1,3 @@
-#include <numbers>
-
 #include "core/effects/list.h"
 
 namespace unrig {
@@ -15,17 +13,20 @@ double cube(double a, const double* p, double& slope, double* partial) {
 
 }  // namespace
 
-/// A lift curve that bends: with a_e the effective angle of attack at three-quarter chord, counted from that before the motion, the normal force on a strip of length l loses 2 pi k a_e^3 q c l at once, so that the slope falls
-/// to s - 6 pi k a_e^2. k is shared by the runs.
-/// Source: I. H. Abbott and A. E. von Doenhoff, Theory of Wing Sections (1959), chapter 7 (the slope falls towards maximum lift).
+/// A lift curve that bends: with a_E the angle of attack that circulation has caught up with on a strip,
+///
+///   a_E = (1/U) Int phi(U(t-t')/b) dw(t'),   C_N = s (a_E - k a_E^3),
+///
+/// counted from that before the motion; w, phi and s as in AeroelasticModel. k [1/rad^2] is shared by the runs, s is the slope of each run's normal force.
+/// Source: J. G. Leishman and T. S. Beddoes, J. American Helicopter Society 34(3) (1989) 3 (the static curve at the effective angle).
 Effect lift_curve() {
   Effect e;
   e.id = "lift-curve";
   e.summary = "lift that bends away from a straight line as the angle grows";
-  e.equation = "C_N = s a_e - 2 pi k a_e^3";
+  e.equation = "C_N = s (a_E - k a_E^3)";
   e.kind = "lift";
-  e.source = "Abbott and von Doenhoff, Theory of Wing Sections (1959), chapter 7";
-  e.parameters = {{"cubic", "1", 0, -1e30, 1e30, false, "Record steps of several sizes."}};
+  e.source = "Leishman and Beddoes, J. American Helicopter Society 34(3) (1989) 3";
+  e.parameters = {{"bend", "1/rad^2", 0, -1e30, 1e30, false, "Record steps of several sizes."}};
   for (const double k : {5.0, 50.0, -20.0}) e.starts.push_back(Eigen::VectorXd::Constant(1, k));
   e.draw = [](const AeroelasticModel&, double, Effect::Random& random) -> Eigen::VectorXd { return Eigen::VectorXd::Constant(1, log_between(random, 1, 80)); };
   e.acts_in = "a run in a stream";
@@ -33,10 +34,19 @@ Effect lift_curve() {
   e.in_the_load = true;
   e.needs = Needs::beam;
   e.apply = [](LinearSystem& system, const EffectContext& c) {
-    const Rig& rig = c.model.rig();
-    const double per_strip = 0.5 * c.conditions.density * c.conditions.speed * c.conditions.speed * rig.chord * rig.strip_length * 2 * std::numbers::pi;
-    for (Eigen::Index s = 0; s < c.ports.strips; ++s)
-      append_feedback(system, port(system, c.ports.strip + s, per_strip), {angle_of_attack(system, c.model, c.conditions.speed, s), c.first_parameter, 1, of_one<cube>});
+    if (system.lags == 0) return;
+    const Eigen::Index strips = c.ports.strips, first = 2 * system.coordinates;
+    const Eigen::MatrixXd w = downwash(system, c).of_states.value;
+    Eigen::MatrixXd caught_up = w;
+    for (Eigen::Index k = 0; k < c.model.circulation().rate.size(); ++k) {
+      const double amplitude = c.model.circulation_amplitude(c.theta, k);
+      caught_up -= amplitude * w;
+      caught_up.middleCols(first + k * strips, strips) += amplitude * Eigen::MatrixXd::Identity(strips, strips);
+    }
+    for (Eigen::Index s = 0; s < strips; ++s) {
+      const DualMatrix ports = c.conditions.speed * circulation_ports(system, c);  // anew: each force is a further input
+      append_feedback(system, ports.block(0, s, ports.rows(), 1), {caught_up.row(s) / c.conditions.speed, c.first_parameter, 1, of_one<cube>});
+    }
   };
   return e;
 }

@@ -68,6 +68,14 @@ TEST(FittedEffects, SeparationIsRecoveredFromStepsAtAnyAngle) {
   expect_recovered("a4", "separation-lag", {{"separation-lag.loss", truth["loss"]}, {"separation-lag.time", truth["time_semichords"]}}, folder);
 }
 
+/// Steps from 2, 4 and 25 degrees on one bent curve.
+TEST(FittedEffects, TheBendOfTheLiftCurveIsRecovered) {
+  UNRIG_NEEDS_SHARED("campaigns/open2");
+  const std::string folder = test::shared_path("campaigns/open2/");
+  const nlohmann::json truth = nlohmann::json::parse(read_text(folder + "KEY.json"))["o4"]["parameters"];
+  expect_recovered("o4", "lift-curve", {{"lift-curve.bend", truth["cubic_lift"]}}, folder);
+}
+
 /// Finite span in mains hum: the build-up of circulation is the one with which the campaign was made, within its errors, which are small beside what it is off Wagner's.
 TEST(FittedEffects, TheBuildUpOfCirculationIsRecovered) {
   UNRIG_NEEDS_SHARED("campaigns/open2");
