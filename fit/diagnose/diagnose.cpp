@@ -298,9 +298,23 @@ struct Laws {
 
 bool leaves_something(const Trial& t) { return what_remains(t).found; }
 
+/// Whether the runs determine no parameter of some member: what they then say is that something acts, not by which equation.
+bool is_undetermined(const FitProblem& problem, const Trial& set) {
+  FitProblem with = problem;
+  with.effects = set.effects;
+  with.rig.laws = set.arrival.joint.model().rig().laws;
+  Arrival arrival = set.arrival;
+  const FitResult fit = describe_fit(arrival, with, Settle::nothing);
+  return std::any_of(set.effects.begin(), set.effects.end(), [&](const std::string& id) {
+    const auto is_own = [&](const FittedParameter& p) { return p.name.starts_with(id + "."); };
+    const auto is_known = [&](const FittedParameter& p) { return is_own(p) && p.identified; };
+    return std::any_of(fit.parameters.begin(), fit.parameters.end(), is_own) && std::none_of(fit.parameters.begin(), fit.parameters.end(), is_known);
+  });
+}
+
 /// The law of what no effect explains: beside nothing, since an effect of the list may stand in for it, and beside the best set. A law that is on the list goes by its id: an effect of the list comes first where
 /// no form is decisively better. What leaves nothing comes before the rest: of sets that set decays aside the evidence is that of the other runs. Where the first is named, leaves nothing or is no worse than any
-/// set that was tried, and is decisively better than what was `found`, it is in `found`.
+/// set that was tried, and is decisively better than what was `found`, it is in `found`. An equation of which the runs determine nothing is no answer.
 std::optional<Laws> look_for_laws(const DiagnoseProblem& problem, FitProblem& fit_problem, const Setting& files, const Trial& baseline, Selection& selection, FoundSet& found) {
   Laws laws;
   const auto look_beside = [&](const Trial& base) {
@@ -315,6 +329,7 @@ std::optional<Laws> look_for_laws(const DiagnoseProblem& problem, FitProblem& fi
   if (!found.best.effects.empty()) look_beside(found.best);
   std::stable_sort(laws.tried.begin(), laws.tried.end(), [](const Trial& a, const Trial& b) { return bic_difference(a, b) < 0; });
   fit_problem.rig.laws.clear();
+  while (!laws.tried.empty() && is_undetermined(fit_problem, laws.tried.front())) laws.tried.erase(laws.tried.begin());
   if (laws.tried.empty()) return std::nullopt;
   const auto rest = std::stable_partition(laws.tried.begin(), laws.tried.end(), [](const Trial& t) { return !leaves_something(t); });
   const auto last = rest == laws.tried.begin() ? laws.tried.end() : rest;

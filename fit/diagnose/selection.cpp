@@ -23,6 +23,7 @@ using Trials = std::vector<Trial>;  // the best first once they are fitted
 using Tell = std::function<void(const std::string&)>;
 
 constexpr double nearly_explained = 10, twice_the_noise = 2;
+constexpr double half_way = 0.5;
 constexpr double hardly_less = 0.9;  // of the excess: an effect that leaves so much of it is not what is missing
 constexpr std::size_t most_refits = 5, most_in_full = 2;
 constexpr std::size_t few = 7;  // candidates that are all worth a fit
@@ -164,7 +165,7 @@ Trials Selection::try_one_more(const Trial& base, const Strings& hopeless) {
     const bool promises = linear.size() + others.size() < most_refits && (trial->score > 0.25 * best_score || (follows_law && far));
     const bool step_says_nothing = far && brings_a_law(*trial);  // a law far from the truth
     if (prepared.size() <= few || promises_nothing || promises || step_says_nothing) (follows_law ? others : linear).push_back(std::move(*trial));
-    else if (unpromising.size() < most_in_full && !follows_law) unpromising.push_back(std::move(*trial));
+    else if (!follows_law) unpromising.push_back(std::move(*trial));
   }
   // Linear effects first, which are an order faster; nonlinear ones where none of those leaves nothing or they promise as much.
   constexpr double clearly = 0.8;
@@ -188,6 +189,7 @@ Trials Selection::try_one_more(const Trial& base, const Strings& hopeless) {
       if (!done && !decays_have_told && !any_leaves_nothing(linear)) fit_anew(fit_problem_, followed);
       if (!done && !any_does() && base.effects.empty() && base.reduced_chi2() > nearly_explained) fit_others_anew(fit_problem_, linear);
       if (!any_does()) {  // far from the truth one linear step promises little of what there is
+        fit_linear(unpromising);
         fit_anew(fit_problem_, unpromising);
         std::move(unpromising.begin(), unpromising.end(), std::back_inserter(linear));
       }
@@ -225,32 +227,65 @@ Trial Selection::without_superfluous(Trial trial) const {
   return trial;
 }
 
-/// Of several effects that leave a mismatch a signal is exchanged for what explains more beside the others: found first, it may have stood in for what was still missing.
-Trial Selection::exchanged(Trial trial, const Strings& hopeless) {
-  for (std::size_t k = 0; k + 1 < trial.effects.size(); ++k) {
-    if (!is_a_signal(trial.effects[k], trial.arrival.joint) || !what_remains(trial).found) continue;
-    Strings fewer = trial.effects, not_again = hopeless;
-    not_again.push_back(fewer[k]);
-    fewer.erase(fewer.begin() + static_cast<std::ptrdiff_t>(k));
-    tell("trying what may be missing in place of " + not_again.back());
-    Trial others = prepare(fit_problem_, trial, fewer);
-    fit_fully(others, 6);
-    Trials tried = try_one_more(others, not_again);
-    if (tried.empty() || bic_difference(tried.front(), trial) > -decisive) continue;
-    trial = without_superfluous(tried.front());
-    std::move(tried.begin(), tried.end(), std::back_inserter(tried_));
-  }
-  return trial;
+/// Sets with another effect in place of `member`, fitted from `best`, where motions and theta are all but known: of those that were not fitted before the ones that promise half of what the member does.
+Trials Selection::rivals(const Trial& best, const std::string& member) {
+  Strings fewer = best.effects;
+  std::erase(fewer, member);
+  Trial others = prepare(fit_problem_, best, fewer);
+  measure(others);
+  // chi-square: with the member, and where a step without it and without anything in its place ends.
+  const double with_it = best.arrival.joint.chi2(), now = others.arrival.joint.chi2(), without = (1 - others.score) * with_it;
+  const Strings ids = candidates(best.effects, {});
+  std::vector<std::optional<Trial>> prepared(ids.size());
+  in_parallel(ids.size(), [&](std::size_t i) {
+    Strings set = fewer;
+    set.push_back(ids[i]);
+    if (is_fitted(set)) return;
+    Trial trial = prepare(fit_problem_, others, set);
+    const bool law_does_little = brings_a_law(trial) && others.reduced_chi2() < nearly_explained;
+    const double promise = law_does_little ? faint_promise(trial, others) : trial.score;
+    if (without - (1 - promise) * now > half_way * (without - with_it)) prepared[i] = std::move(trial);
+  });
+  Trials rivals;
+  for (std::optional<Trial>& trial : prepared)
+    if (trial) rivals.push_back(std::move(*trial));
+  in_parallel(rivals.size(), [&](std::size_t i) {
+    Trial& rival = rivals[i];
+    if (!brings_a_law(rival)) fit_fully(rival, 2);
+    else if (!follow_nonlinear(rival, others, others.reduced_chi2())) return;
+    if (leaves_nothing(rival) && !decays_decide(rival)) leave_out_terms(rival);
+  });
+  keep_distinct(rivals);
+  std::erase_if(rivals, [](const Trial& t) { return t.ruled_out || !plausible(t); });
+  std::sort(rivals.begin(), rivals.end(), [](const Trial& a, const Trial& b) { return bic_difference(a, b) < 0; });
+  for (const Trial& t : rivals) ranking_.push_back({t.effects, t.reduced_chi2(), bic_difference(t, baseline_), 0, fewer.empty() ? t.score : 0, search_of(t, others)});
+  return rivals;
 }
 
-/// What explains by far the most of `tried` may have come to rest at a limit because an earlier effect does part of its work: it is given the chance to do all of it.
-Trial Selection::without_stand_in(const Trials& tried) {
-  const auto best = std::min_element(tried.begin(), tried.end(), [](const Trial& a, const Trial& b) { return bic_difference(a, b) < 0; });
-  if (best->effects.size() < 2 || plausible(*best)) return tried.front();
-  Trial alone = without_superfluous(*best);
-  if (!plausible(alone) || bic_difference(alone, tried.front()) > -decisive) return tried.front();
-  ranking_.push_back({alone.effects, alone.reduced_chi2(), bic_difference(alone, baseline_), 0, 0});
-  return alone;
+/// Each member is challenged by its rivals: far from the truth a step promises little of what there is, and a search ends with the first that explains the runs.
+Trial Selection::challenged(Trial best) {
+  const Strings members = best.effects;
+  for (const std::string& member : members) {
+    tell("trying what may explain the runs in place of " + member);
+    Trials tried = rivals(best, member);
+    if (tried.empty()) continue;
+    if (bic_difference(tried.front(), best) < 0) {
+      fit_fully(tried.front(), 6);
+      std::swap(best, tried.front());
+    }
+    std::move(tried.begin(), tried.end(), std::back_inserter(tried_));
+  }
+  return best;
+}
+
+/// Whether this set was fitted, in whichever order.
+bool Selection::is_fitted(Strings set) const {
+  std::sort(set.begin(), set.end());
+  return std::any_of(ranking_.begin(), ranking_.end(), [&](const Candidate& c) {
+    Strings known = c.effects;
+    std::sort(known.begin(), known.end());
+    return known == set;
+  });
 }
 
 /// A law is not found from far away where the modes of a beam are too few for its trajectory: where nothing explains what is missing, every effect is tried beside the modes that were left out too.
@@ -273,7 +308,6 @@ void Selection::stop() {
 
 void Selection::grow(Trial& best, const std::function<bool(const Trial&)>& enough, std::optional<Trial>& sufficient) {
   Strings hopeless;  // laws with which alone the fit is worse than without: from that far away they are not found, and are not tried again before half of the way is gone
-  constexpr double half_way = 0.5;
   while (!stopped_ && best.effects.size() < most_effects && what_remains(best).found) {
     best = in_finer_steps(best);
     if (!what_remains(best).found) break;
@@ -286,12 +320,12 @@ void Selection::grow(Trial& best, const std::function<bool(const Trial&)>& enoug
     if (best.effects.empty()) try_with_all_modes(tried);
     std::erase_if(tried, [&](const Trial& t) { return !leaves_nothing(t) && takes_nothing(t, best); });
     if (tried.empty()) break;
-    const Trial next = without_stand_in(tried);
+    const Trial next = tried.front();
     if (!(best.effects.empty() || plausible(next)) || bic_difference(next, best) > -decisive) break;
     if (next.excess() < half_way * best.excess()) hopeless.clear();
     best = next;
     if (!stopped_) {
-      Trial settled = exchanged(without_superfluous(next), hopeless);
+      Trial settled = without_superfluous(challenged(without_superfluous(next)));
       judge_decays(settled);
       best = std::move(settled);
     }

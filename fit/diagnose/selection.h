@@ -18,7 +18,7 @@ Mismatch what_remains(const Trial& trial);
 SearchOutcome search_of(const Trial& trial, const Trial& base);
 
 /// Which set of effects explains what a baseline leaves. The set grows by one effect at a time, the best of all that are worth a fit; what others made superfluous
-/// is taken away again, and while a mismatch remains signals among the earlier members are exchanged for what explains more beside the others. No set has more than three.
+/// is taken away again, and each member is challenged by what was not fitted in its place. No set has more than three.
 class Selection {
  public:
   /// Looks at all three as long as it lives.
@@ -43,8 +43,9 @@ class Selection {
   std::vector<Trial> try_one_more(const Trial& base, const std::vector<std::string>& hopeless);
   Trial without_superfluous(Trial trial) const;
   void try_with_all_modes(std::vector<Trial>& tried);
-  Trial without_stand_in(const std::vector<Trial>& tried);
-  Trial exchanged(Trial trial, const std::vector<std::string>& hopeless);
+  std::vector<Trial> rivals(const Trial& best, const std::string& member);
+  Trial challenged(Trial best);
+  bool is_fitted(std::vector<std::string> set) const;
   void tell(const std::string& what) const {
     if (problem_.progress) problem_.progress(what);
   }

@@ -156,25 +156,6 @@ void anneal(Arrival& arrival, int rounds) {
   }
 }
 
-void measure(Trial& trial) {
-  JointProblem& joint = trial.arrival.joint;
-  trial.variance.clear();
-  trial.samples.clear();
-  trial.angle_variance.clear();
-  trial.angle_samples.clear();
-  trial.variables = 0;
-  const std::vector<LeftOfRun> left = left_of_runs(joint);
-  for (std::size_t r = 0; r < left.size(); ++r) {
-    const bool as_trusted = !trial.decays.exactly && std::isfinite(trial.decays.chi2) && joint.runs()[r].motion().unknowns() == 0;
-    trial.variance.push_back(as_trusted ? std::max(1.0, trial.decays.chi2) : left[r].variance);
-    trial.samples.push_back(left[r].independent);
-    trial.angle_variance.push_back(left[r].angle_variance);
-    trial.angle_samples.push_back(left[r].angle_samples);
-    trial.variables += static_cast<int>(left[r].unknowns);
-  }
-  for (const Unknown& u : joint.unknowns()) trial.variables += u.held ? 0 : 1;
-}
-
 /// Whether an effect is a nonlinear law in any of the runs.
 bool is_a_law(const std::string& id, const AeroelasticModel& rig, const JointProblem& joint) {
   const AeroelasticModel model = rig.with_effects({id});
@@ -194,6 +175,25 @@ std::vector<std::vector<std::string>> in_order(const FitProblem& problem, const 
 }
 
 }  // namespace
+
+void measure(Trial& trial) {
+  JointProblem& joint = trial.arrival.joint;
+  trial.variance.clear();
+  trial.samples.clear();
+  trial.angle_variance.clear();
+  trial.angle_samples.clear();
+  trial.variables = 0;
+  const std::vector<LeftOfRun> left = left_of_runs(joint);
+  for (std::size_t r = 0; r < left.size(); ++r) {
+    const bool as_trusted = !trial.decays.exactly && std::isfinite(trial.decays.chi2) && joint.runs()[r].motion().unknowns() == 0;
+    trial.variance.push_back(as_trusted ? std::max(1.0, trial.decays.chi2) : left[r].variance);
+    trial.samples.push_back(left[r].independent);
+    trial.angle_variance.push_back(left[r].angle_variance);
+    trial.angle_samples.push_back(left[r].angle_samples);
+    trial.variables += static_cast<int>(left[r].unknowns);
+  }
+  for (const Unknown& u : joint.unknowns()) trial.variables += u.held ? 0 : 1;
+}
 
 bool any_aside(const JointProblem& joint) {
   return std::any_of(joint.runs().begin(), joint.runs().end(), [](const RunResidual& run) { return run.is_aside(); });
@@ -308,6 +308,17 @@ Trial prepare(const FitProblem& problem, const Trial& base, const std::vector<st
   trial.score = promised_share(trial.arrival.joint, base.arrival.joint.chi2());
   for (RunResidual& run : trial.arrival.joint.runs()) run.glance(false);
   return trial;
+}
+
+double faint_promise(const Trial& trial, const Trial& base) {
+  constexpr double faint = 1e-3;
+  JointProblem joint = trial.arrival.joint;
+  const std::vector<Unknown*> own = unknowns_of(joint, trial.effects.back());
+  if (own.empty()) return trial.score;
+  Unknown& size = *own.front();
+  size.value = std::clamp(faint * size.value, joint.parameter(size).lower, joint.parameter(size).upper);
+  for (RunResidual& run : joint.runs()) run.glance(true);
+  return promised_share(joint, base.arrival.joint.chi2());
 }
 
 void fit_fully(Trial& trial, int rounds) {

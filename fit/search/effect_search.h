@@ -30,6 +30,9 @@ constexpr std::size_t most_effects = 3;  ///< of one set
 constexpr double explained = 1.15;  ///< residual power over noise power of a model that leaves nothing to name
 inline bool leaves_nothing(const Trial& trial) { return trial.reduced_chi2() < explained; }
 
+/// Sets what a trial leaves of each run, as it stands.
+void measure(Trial& trial);
+
 /// Whether any of the runs counts for nothing (RunResidual::set_aside).
 bool any_aside(const JointProblem& joint);
 
@@ -57,6 +60,9 @@ void take_noise_of(Trial& trial, const Trial& other);
 
 /// One linear step from `base` with `effects` (those of base and one more): what would it remove?
 Trial prepare(const FitProblem& problem, const Trial& base, const std::vector<std::string>& effects);
+
+/// The same of a prepared trial where the size of its last effect is a thousandth of its start: what a law promises that does little.
+double faint_promise(const Trial& trial, const Trial& base);
 
 /// Residual power over noise power of the runs whose motion is not estimated.
 double left_of_decays(const Trial& trial);
