@@ -233,8 +233,8 @@ Trials Selection::rivals(const Trial& best, const std::string& member) {
   std::erase(fewer, member);
   Trial others = prepare(fit_problem_, best, fewer);
   measure(others);
-  // chi-square: with the member, and where a step without it and without anything in its place ends.
-  const double with_it = best.arrival.joint.chi2(), now = others.arrival.joint.chi2(), without = (1 - others.score) * with_it;
+  // chi-square: with the member, as it is without, and where a step without it ends; the first step may lead astray.
+  const double with_it = best.arrival.joint.chi2(), now = others.arrival.joint.chi2(), without = std::min(now, (1 - others.score) * with_it);
   const Strings ids = candidates(best.effects, {});
   std::vector<std::optional<Trial>> prepared(ids.size());
   in_parallel(ids.size(), [&](std::size_t i) {
@@ -242,8 +242,8 @@ Trials Selection::rivals(const Trial& best, const std::string& member) {
     set.push_back(ids[i]);
     if (is_fitted(set)) return;
     Trial trial = prepare(fit_problem_, others, set);
-    const bool law_does_little = brings_a_law(trial) && others.reduced_chi2() < nearly_explained;
-    const double promise = law_does_little ? faint_promise(trial, others) : trial.score;
+    if (brings_a_law(trial) && others.reduced_chi2() > nearly_explained) return;  // too large a mismatch for two laws to explain alike
+    const double promise = brings_a_law(trial) ? faint_promise(trial, others) : trial.score;
     if (without - (1 - promise) * now > half_way * (without - with_it)) prepared[i] = std::move(trial);
   });
   Trials rivals;
