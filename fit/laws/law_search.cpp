@@ -95,10 +95,16 @@ std::vector<Trial> LawSearch::one_more(const Trial& base) {
 
 std::vector<Trial> LawSearch::search() {
   std::vector<Trial> all = one_more(base_);
-  if (all.empty() || all.front().effects.size() >= most_effects || !leaves_something_(all.front()) || !(bic_difference(all.front(), base_) < 0)) return all;
-  const Trial first = all.front();
-  std::vector<Trial> pairs = one_more(first);
-  std::move(pairs.begin(), pairs.end(), std::back_inserter(all));
+  if (!all.empty() && all.front().effects.size() < most_effects && leaves_something_(all.front()) && bic_difference(all.front(), base_) < 0) {
+    const Trial first = all.front();
+    std::vector<Trial> pairs = one_more(first);
+    std::move(pairs.begin(), pairs.end(), std::back_inserter(all));
+  }
+  in_parallel(all.size(), [&](std::size_t i) {  // rivals are told apart by less than where a search among many ends
+    if (!leaves_nothing(all[i])) return;
+    all[i].arrival.joint.solve({});
+    measure(all[i]);
+  });
   sort_by(all, [&](const Trial& t) { return bic_difference(t, base_); });
   return all;
 }
