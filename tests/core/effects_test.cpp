@@ -416,19 +416,6 @@ TEST(Effects, SheddingBeginsAtEightDegrees) {
   }
 }
 
-/// Turned by 0.1 rad, a strip sees half of that before the circulation's lags have caught up, and all of it after: phi(0) = 1/2, phi(infinity) = 1.
-TEST(Effects, TheLiftCurveIsReadAtTheAngleThatCirculationHasCaughtUpWith) {
-  const Conditions c = conditions_for(beam());
-  const AeroelasticModel model = model_with(beam(), "lift-curve");
-  const LinearSystem system = model.system(c, model.start_values(), {"gauge"});
-  ASSERT_EQ(system.feedback.size(), beam().submerged.size());
-  VectorXd state = VectorXd::Zero(system.states());
-  state[system.motion] = 0.1;
-  for (const Feedback& f : system.feedback) EXPECT_NEAR((f.sees * state)[0], 0.05, 1e-3 * 0.1);
-  state.segment(2 * system.coordinates, system.lags).setConstant(0.1 * c.speed);
-  for (const Feedback& f : system.feedback) EXPECT_NEAR((f.sees * state)[0], 0.1, 1e-12);
-}
-
 /// A step from rest at 2 degrees loses lift as one from 25 does.
 TEST(Effects, SeparationActsAtAnyAngleInAStream) {
   Conditions c = conditions_for(beam());
