@@ -17,7 +17,7 @@ double cube(double a, const double* p, double& slope, double* partial) {
 ///
 ///   a_E = (1/U) Int phi(U(t-t')/b) dw(t'),   C_N = s (a_E - k a_E^3),
 ///
-/// counted from that before the motion; w, phi and s as in AeroelasticModel. k [1/rad^2] is shared by the runs, s is the slope of each run's normal force.
+/// counted from that before the motion; w and s as in AeroelasticModel, phi Wagner's function, also where the build-up is searched. k [1/rad^2] is shared by the runs, s is the slope of each run's normal force.
 /// Source: J. G. Leishman and T. S. Beddoes, J. American Helicopter Society 34(3) (1989) 3 (the static curve at the effective angle).
 Effect lift_curve() {
   Effect e;
@@ -39,7 +39,7 @@ Effect lift_curve() {
     const Eigen::MatrixXd w = downwash(system, c).of_states.value;
     Eigen::MatrixXd caught_up = w;
     for (Eigen::Index k = 0; k < c.model.circulation().rate.size(); ++k) {
-      const double amplitude = c.model.circulation_amplitude(c.theta, k);
+      const double amplitude = c.model.circulation().amplitude[k];  // what a law sees has no partials: not that of a build-up that is searched
       caught_up -= amplitude * w;
       caught_up.middleCols(first + k * strips, strips) += amplitude * Eigen::MatrixXd::Identity(strips, strips);
     }

@@ -311,7 +311,7 @@ Trial prepare(const FitProblem& problem, const Trial& base, const std::vector<st
 }
 
 double faint_promise(const Trial& trial, const Trial& base) {
-  constexpr double faint = 1e-3;
+  constexpr double faint = 1e-3;  // not 0, where the shape of a law has no slope; no count behind it
   JointProblem joint = trial.arrival.joint;
   const std::vector<Unknown*> own = unknowns_of(joint, trial.effects.back());
   if (own.empty()) return trial.score;

@@ -1,7 +1,5 @@
 #include <gtest/gtest.h>
 
-#include <string>
-
 #include "core/effects/effect.h"
 #include "core/model/aeroelastic_model.h"
 #include "tests/support/sample_data.h"
