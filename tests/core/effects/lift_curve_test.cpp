@@ -35,6 +35,17 @@ TEST_F(LiftCurveInAStream, IsReadAtTheAngleThatCirculationHasCaughtUpWith) {
   for (const Feedback& f : system.feedback) EXPECT_NEAR((f.sees * state)[0], 0.1, 1e-12);
 }
 
+/// What a law sees carries no partials: it may not move with theta, not even where the amplitudes of the build-up are among it.
+TEST_F(LiftCurveInAStream, SeesTheSameWhereTheBuildUpIsSearched) {
+  const AeroelasticModel free = AeroelasticModel(rig, model.basis(), model.circulation(), AeroelasticModel::Circulation::free).with_effects({"lift-curve"});
+  const VectorXd start = free.start_values();
+  VectorXd moved = start;
+  for (Index k = 0; k < free.circulation().rate.size(); ++k) moved[free.circulation_parameter(k)] *= 1.2;
+  ASSERT_NE(moved, start);
+  const LinearSystem one = free.system(conditions, start, {"gauge"}), other = free.system(conditions, moved, {"gauge"});
+  for (std::size_t i = 0; i < one.feedback.size(); ++i) EXPECT_EQ(one.feedback[i].sees, other.feedback[i].sees);
+}
+
 /// The lift lost in the end is the share k a^2 of s a: what the linear part gains by a is what the bent one loses at that share, whatever the slope.
 TEST_F(LiftCurveInAStream, LosesItsShareOfTheLinearLift) {
   constexpr double bend = 40, angle = 0.1, rounding = 1e-9;
