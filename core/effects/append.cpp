@@ -124,6 +124,18 @@ OnStrips downwash(const LinearSystem& system, const EffectContext& c) {
   return w;
 }
 
+MatrixXd caught_up_angle(const LinearSystem& system, const EffectContext& c) {
+  const Index strips = c.ports.strips, first = 2 * system.coordinates;
+  const MatrixXd w = downwash(system, c).of_states.value;
+  MatrixXd caught_up = w;
+  for (Index k = 0; k < c.model.circulation().rate.size(); ++k) {
+    const double amplitude = c.model.circulation().amplitude[k];
+    caught_up -= amplitude * w;
+    caught_up.middleCols(first + k * strips, strips) += amplitude * MatrixXd::Identity(strips, strips);
+  }
+  return caught_up / c.conditions.speed;
+}
+
 Index append_lag(LinearSystem& system, const EffectContext& c, const DualMatrix& rate) {
   const Index lag = system.states(), strips = c.ports.strips;
   const DualMatrix per_time = (c.conditions.speed / c.model.rig().semichord()) * rate;

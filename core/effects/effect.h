@@ -126,6 +126,9 @@ struct OnStrips {
 };
 /// Downwash w [m/s] at three-quarter chord of each strip (AeroelasticModel). Of a beam in a stream.
 OnStrips downwash(const LinearSystem& system, const EffectContext& context);
+/// Angle of attack that circulation has caught up with on each strip [rad], a_E = (1/U) Int phi(U(t-t')/b) dw(t'), phi Wagner's function, also where the build-up is searched: strips x states. What a law sees of
+/// states has no partials. Of a beam in a stream.
+Eigen::MatrixXd caught_up_angle(const LinearSystem& system, const EffectContext& context);
 /// A lag of the downwash on each strip, y' = r (U/b) (w - y), at rest where the rig is. `rate`: r [1/semichord] on the strips. Returns the index of the first strip's y.
 Eigen::Index append_lag(LinearSystem& system, const EffectContext& context, const DualMatrix& rate);
 /// What a downwash of 1 m/s on each strip does in the end, s rho U b l at quarter chord: over all input columns x strips; s the slope of the run's normal force.

@@ -35,17 +35,10 @@ Effect lift_curve() {
   e.needs = Needs::beam;
   e.apply = [](LinearSystem& system, const EffectContext& c) {
     if (system.lags == 0) return;
-    const Eigen::Index strips = c.ports.strips, first = 2 * system.coordinates;
-    const Eigen::MatrixXd w = downwash(system, c).of_states.value;
-    Eigen::MatrixXd caught_up = w;
-    for (Eigen::Index k = 0; k < c.model.circulation().rate.size(); ++k) {
-      const double amplitude = c.model.circulation().amplitude[k];  // what a law sees has no partials: not that of a build-up that is searched
-      caught_up -= amplitude * w;
-      caught_up.middleCols(first + k * strips, strips) += amplitude * Eigen::MatrixXd::Identity(strips, strips);
-    }
-    for (Eigen::Index s = 0; s < strips; ++s) {
+    const Eigen::MatrixXd angle = caught_up_angle(system, c);
+    for (Eigen::Index s = 0; s < c.ports.strips; ++s) {
       const DualMatrix ports = c.conditions.speed * circulation_ports(system, c);  // anew: each force is a further input
-      append_feedback(system, ports.block(0, s, ports.rows(), 1), {caught_up.row(s) / c.conditions.speed, c.first_parameter, 1, of_one<cube>});
+      append_feedback(system, ports.block(0, s, ports.rows(), 1), {angle.row(s), c.first_parameter, 1, of_one<cube>});
     }
   };
   return e;

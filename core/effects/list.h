@@ -24,5 +24,7 @@ Effect twist_stiffness();
 Effect elastic_coupling();
 Effect bouc_wen();
 Effect cubic_damping();
+Effect speed_surge();
+Effect filling_mass();
 
 }  // namespace unrig

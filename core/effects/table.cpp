@@ -27,6 +27,8 @@ const std::vector<Effect>& effects() {
       elastic_coupling(),
       bouc_wen(),
       cubic_damping(),
+      speed_surge(),
+      filling_mass(),
   };
   return table;
 }

@@ -138,15 +138,8 @@ void check_memory(const TomlTable& file, const Law& law) {
   if (!law.memory && law.force.uses(Symbol::z)) file.fail("force", "z in `force`, but no `memory`", "wanted memory = \"...\", the rate z' of z", "");
 }
 
-/// A force that answers to acceleration is mass: linear, with a factor that does not change within a run.
 void check_acceleration(const TomlTable& file, const Law& law) {
   if (law.memory && law.memory->uses(Symbol::a)) file.fail("memory", "the acceleration a in `memory`", "wanted a rate of displacements and velocities", "The velocity v is its integral.");
-  if (!law.force.uses(Symbol::a)) return;
-  const auto split = law.force.linear_in(Symbol::a);
-  const auto varies = [&](Symbol s) { return s != Symbol::U && split->factor.uses(s); };
-  bool constant = split.has_value();
-  for (std::size_t s = 0; s < symbol_count && constant; ++s) constant = !varies(static_cast<Symbol>(s));
-  if (!constant) file.fail("force", "a force with the acceleration a in it, but not as a mass", "wanted a only times what stays the same in a run, as in \"-m * a - k * x^3\"", "What changes with the motion and multiplies a cannot be followed.");
 }
 
 /// The law at its start values, with every symbol zero but a stream.

@@ -57,6 +57,14 @@ bool acts_at_rest(const Expression& force, const Symbols& at_rest, const double*
   return std::any_of(partial.begin(), partial.begin() + static_cast<std::ptrdiff_t>(parameters), [](double d) { return d != 0; });
 }
 
+/// factor * symbol + rest, where the factor stays what it is within a run.
+auto constant_share(const Expression& force, Symbol symbol) {
+  auto split = force.linear_in(symbol);
+  for (std::size_t s = 0; s < symbol_count && split; ++s)
+    if (static_cast<Symbol>(s) != Symbol::U && split->factor.uses(static_cast<Symbol>(s))) split.reset();
+  return split;
+}
+
 /// What a unit of the law does: to the rates of the states, and to the outputs at once.
 struct Push {
   DualMatrix states, outputs;
@@ -103,7 +111,7 @@ class LawAtWork {
   void act_by(Push push, Index strip) {
     Expression force = law_.force;
     View view = view_of(strip);
-    if (const auto split = force.uses(Symbol::a) ? force.linear_in(Symbol::a) : std::nullopt) {
+    if (const auto split = force.uses(Symbol::a) ? constant_share(force, Symbol::a) : std::nullopt) {
       push = add_mass(push, view, factor_of(split->factor, view));
       force = split->rest;
     }
@@ -125,6 +133,7 @@ class LawAtWork {
     };
     set(Symbol::x, 0, displacement_of(system_, view.moves));
     set(Symbol::v, 0, rate_of(system_, view.moves));
+    set(Symbol::a, 0, rate_of(system_, view.moves));  // over the states' rates
     set(Symbol::U, U, {});
     if (clock_ >= 0) set(Symbol::t, 0, state(clock_));
     if (rig.is_modal()) return view;
@@ -153,7 +162,11 @@ class LawAtWork {
       if (expression.uses(static_cast<Symbol>(s)) && view.row[s].size() > 0) seen.symbol.push_back(s);
     Feedback feedback;
     feedback.sees = MatrixXd::Zero(std::max<Index>(1, static_cast<Index>(seen.symbol.size())), system_.states());
-    for (std::size_t k = 0; k < seen.symbol.size(); ++k) feedback.sees.row(static_cast<Index>(k)).head(view.row[seen.symbol[k]].size()) = view.row[seen.symbol[k]];
+    if (expression.uses(Symbol::a)) feedback.sees_rates = feedback.sees;
+    for (std::size_t k = 0; k < seen.symbol.size(); ++k) {
+      MatrixXd& sees = seen.symbol[k] == at(Symbol::a) ? feedback.sees_rates : feedback.sees;
+      sees.row(static_cast<Index>(k)).head(view.row[seen.symbol[k]].size()) = view.row[seen.symbol[k]];
+    }
     feedback.first_parameter = c_.first_parameter;
     feedback.parameters = static_cast<Index>(law_.parameters.size());
     feedback.law = std::move(seen);
@@ -187,10 +200,7 @@ class LawAtWork {
   Expression add_memory(Push& push, View& view, Expression force) {
     const Index memory = append_state();
     push.states = push.states.grown(memory + 1, 1);
-    const auto split = force.linear_in(Symbol::z);
-    bool constant = split.has_value();
-    for (std::size_t s = 0; s < symbol_count && constant; ++s) constant = static_cast<Symbol>(s) == Symbol::U || !split->factor.uses(static_cast<Symbol>(s));
-    if (constant) {
+    if (const auto split = constant_share(force, Symbol::z)) {
       const DualMatrix factor = factor_of(split->factor, view);
       system_.A.set_block(0, memory, push.states * factor);
       system_.C.set_block(0, memory, push.outputs * factor);

@@ -21,7 +21,8 @@ struct LawEffect : Effect {
 ///
 ///   x' = A x + B (u + direction f(symbols)),   z' = memory(symbols, z)
 ///
-/// A term `factor * a` is a mass: with a = r x' it is solved for exactly, f = factor a_0 / (1 - factor r b), a_0 the acceleration without it, b what a unit force does to x'.
+/// A term `factor * a` whose factor stays what it is within a run is a mass: with a = r x' it is solved for exactly, f = factor a_0 / (1 - factor r b), a_0 the acceleration without it, b what a
+/// unit force does to x'. Elsewhere a law sees the acceleration that its own force has part in (core/propagate/feedback_force.h).
 /// A term `factor * z` is linear and stays with the exact step (core/propagate/nonlinear_response.h); the rest runs straight from step to step.
 std::shared_ptr<const LawEffect> law_effect(Law law);
 

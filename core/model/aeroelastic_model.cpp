@@ -170,7 +170,9 @@ void keep_inputs(LinearSystem& system, const Conditions& conditions) {
     for (std::size_t k = 0; k < kept.size(); ++k) part.set_block(0, static_cast<Index>(k), m->block(0, kept[k], m->rows(), 1));
     *m = std::move(part);
   }
-  for (Feedback& f : system.feedback) f.sees.conservativeResizeLike(MatrixXd::Zero(f.sees.rows(), system.states()));  // states that came later
+  for (Feedback& f : system.feedback)  // states that came later
+    for (MatrixXd* m : {&f.sees, &f.sees_rates})
+      if (m->rows() > 0) m->conservativeResizeLike(MatrixXd::Zero(m->rows(), system.states()));
 }
 
 /// Lets an effect change the system, by no more states than it said before it saw theta: searches carry states from one theta to the next.

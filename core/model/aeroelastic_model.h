@@ -41,8 +41,8 @@ struct Conditions {
   double nyquist = 0;  ///< Hz, half the sampling rate; 0: not known
 };
 
-/// A static nonlinear function f(z) that rides on the linear system: it drives one input column and looks at a few combinations of the states, its arguments
-/// z = sees x. A law with memory has it as a state of its own, whose rate is such a function (append_memory in core/effects/effect.h).
+/// A static nonlinear function f(z) that rides on the linear system: it drives one input column and looks at a few combinations of the states and of their rates, its arguments
+/// z = sees x + sees_rates x'. A law with memory has it as a state of its own, whose rate is such a function (append_memory in core/effects/effect.h).
 struct Feedback {
   Eigen::MatrixXd sees;             ///< arguments x states: displacements, rates, memories
   Eigen::Index first_parameter = 0; ///< of the law, in theta
@@ -53,6 +53,7 @@ struct Feedback {
   /// For searches, the same with its corners rounded; none where it has no corners.
   Law rounded = nullptr;
   Eigen::Index steps_per_sample = 1;  ///< in which its response is followed: more where z crosses a corner of the law within a sample
+  Eigen::MatrixXd sees_rates = {};    ///< arguments x states: accelerations are rates of velocities; empty: none
 };
 
 /// The coupled model of one run as a linear state equation with exact partial derivatives in theta:

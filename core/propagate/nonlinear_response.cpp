@@ -114,21 +114,33 @@ struct StepMatrices {
   Index argument() const { return states; }
   Index output() const { return states + arguments; }
 
-  StepMatrices(const LinearSystem& system, const ExactStep& exact, const MatrixXd& sees, Index parameter_count)
-      : states(system.states()), feedbacks(static_cast<Index>(system.feedback.size())), arguments(sees.rows()), channels(system.C.rows()), measured(system.B.cols() - feedbacks), parameters(parameter_count) {
+  StepMatrices(const LinearSystem& system, const ExactStep& exact, const Arguments& seen, Index parameter_count)
+      : states(system.states()), feedbacks(static_cast<Index>(system.feedback.size())), arguments(seen.count()), channels(system.C.rows()), measured(system.B.cols() - feedbacks), parameters(parameter_count) {
     const auto value = [](const DualMatrix& m) { return &m.value; };
-    fill(system, exact, sees, value, step, late);
+    fill(system, exact, seen.sees.value, value, step, late);
+    see(seen.sees_input.value, step, late);
     partial.resize(parameters * rows(), inputs());
     late_partial.resize(parameters * rows(), feedbacks);
     MatrixXd d_step, d_late;
     for (Index j = 0; j < parameters; ++j) {
-      fill(system, exact, sees, [j](const DualMatrix& m) { return m.depends_on(j) ? &m.d(j) : nullptr; }, d_step, d_late);
+      fill(system, exact, seen.sees.value, [j](const DualMatrix& m) { return m.depends_on(j) ? &m.d(j) : nullptr; }, d_step, d_late);
+      if (seen.sees.depends_on(j)) {
+        d_step.middleRows(argument(), arguments) += seen.sees.d(j) * step.topRows(states);
+        d_late.middleRows(argument(), arguments) += seen.sees.d(j) * late.topRows(states);
+      }
+      if (seen.sees_input.depends_on(j)) see(seen.sees_input.d(j), d_step, d_late);
       partial.middleRows(j * rows(), rows()) = d_step;
       late_partial.middleRows(j * rows(), rows()) = d_late;
     }
   }
 
  private:
+  /// What the laws see of inputs and forces at the end of the step.
+  void see(const MatrixXd& sees_input, MatrixXd& all, MatrixXd& at_end) const {
+    all.block(argument(), input() + measured, arguments, measured) += sees_input.leftCols(measured);
+    at_end.middleRows(argument(), arguments) += sees_input.rightCols(feedbacks);
+  }
+
   template <typename Part>
   void fill(const LinearSystem& system, const ExactStep& exact, const MatrixXd& sees, Part part, MatrixXd& all, MatrixXd& at_end) const {
     all = MatrixXd::Zero(padded_rows(states + arguments + channels), states + feedbacks + 1 + 2 * measured);
@@ -170,7 +182,7 @@ class Follower {
         steps_(samples * per_sample_),
         arguments_(system),
         laws_(system, arguments_, theta),
-        one_(system, exact, arguments_.sees, partials == Partials::all ? system.A.parameters() : 0),
+        one_(system, exact, arguments_, partials == Partials::all ? system.A.parameters() : 0),
         directions_(drive.start_tangent.cols()),
         columns_(directions_ + one_.parameters),
         gain_(one_.late.middleRows(one_.argument(), one_.arguments)),
@@ -201,8 +213,7 @@ class Follower {
     now_ = MatrixXd::Zero(one_.inputs(), block + 1);
     slope_ = MatrixXd::Zero(one_.arguments, block + 1);
     stepped_ = VectorXd::Zero(one_.rows());
-    z_ = arguments_.sees * drive_.start;
-    laws_.at(z_);
+    start_laws();
     now_.col(0).head(n) = drive_.start;
     now_.col(0).segment(one_.force(), m) = laws_.force;
     slope_.col(0) = laws_.slope;
@@ -212,8 +223,38 @@ class Follower {
     tangent_ = next_ = MatrixXd::Zero(std::max(one_.rows(), one_.input()), columns_);  // the jerk is that of the sample
     if (directions_ > 0) tangent_.topLeftCorner(n, directions_) = drive_.start_tangent;
     if (one_.parameters > 0 && drive_.start_partial.size() > 0) tangent_.topRightCorner(n, one_.parameters) = drive_.start_partial;
-    tangent_.middleRows(one_.force(), m) = by_feedback(slope_.col(0).asDiagonal() * (arguments_.sees * tangent_.topRows(n)));
-    tangent_.block(one_.force(), directions_, m, one_.parameters) += law_partials(0);
+    start_tangents();
+  }
+
+  /// The forces where the stretch begins, which the laws may see in the accelerations.
+  void start_laws() {
+    const MatrixXd of_forces = arguments_.sees_input.value.rightCols(one_.feedbacks);
+    VectorXd known = arguments_.sees.value * drive_.start;
+    if (one_.measured > 0) known += arguments_.sees_input.value.leftCols(one_.measured) * drive_.input.row(0).transpose();
+    z_ = known;
+    laws_.at(z_);
+    if (arguments_.accelerations) z_ = implicit_argument<M>(laws_, known, of_forces, of_forces(Eigen::all, arguments_.owner), z_);
+  }
+
+  /// Of those forces: df = slope dz + partial, dz = sees dx + dsees x + the same of inputs and forces.
+  void start_tangents() {
+    const Index n = one_.states, m = one_.feedbacks, P = one_.parameters;
+    MatrixXd seen = arguments_.sees.value * tangent_.topRows(n), force = MatrixXd::Zero(m, columns_);
+    force.rightCols(P) = law_partials(0);
+    if (!arguments_.accelerations) {
+      tangent_.middleRows(one_.force(), m) = by_feedback(slope_.col(0).asDiagonal() * seen) + force;
+      return;
+    }
+    VectorXd inputs(one_.measured + m);
+    if (one_.measured > 0) inputs.head(one_.measured) = drive_.input.row(0).transpose();
+    inputs.tail(m) = laws_.force;
+    for (Index j = 0; j < P; ++j) {
+      if (arguments_.sees.depends_on(j)) seen.col(directions_ + j) += arguments_.sees.d(j) * drive_.start;
+      if (arguments_.sees_input.depends_on(j)) seen.col(directions_ + j) += arguments_.sees_input.d(j) * inputs;
+    }
+    const MatrixXd of_forces = arguments_.sees_input.value.rightCols(m);
+    const MatrixXd answer = MatrixXd::Identity(m, m) - by_feedback(slope_.col(0).asDiagonal() * of_forces);
+    tangent_.middleRows(one_.force(), m) = answer.partialPivLu().solve(by_feedback(slope_.col(0).asDiagonal() * seen) + force);
   }
 
   auto law_partials(Index k) { return law_partial_.middleCols(k * one_.parameters, one_.parameters); }

@@ -28,6 +28,12 @@ constexpr double hardly_less = 0.9;  // of the excess: an effect that leaves so 
 constexpr std::size_t most_refits = 5, most_in_full = 2;
 constexpr std::size_t few = 7;  // candidates that are all worth a fit
 
+bool same_set(Strings a, Strings b) {
+  std::sort(a.begin(), a.end());
+  std::sort(b.begin(), b.end());
+  return a == b;
+}
+
 /// A few rounds for all, the rest for those that are ahead.
 void fit_linear(Trials& trials) {
   in_parallel(trials.size(), [&](std::size_t i) { fit_fully(trials[i], 2); });
@@ -167,9 +173,10 @@ Trials Selection::try_one_more(const Trial& base, const Strings& hopeless) {
     if (prepared.size() <= few || promises_nothing || promises || step_says_nothing) (follows_law ? others : linear).push_back(std::move(*trial));
     else if (!follows_law) unpromising.push_back(std::move(*trial));
   }
-  // Linear effects first, which are an order faster; nonlinear ones where none of those leaves nothing or they promise as much.
+  // Linear effects first, which are an order faster; nonlinear ones where none of those leaves nothing, and those that promise as much.
   constexpr double clearly = 0.8;
-  const bool favours_linear = others.empty() || (!linear.empty() && clearly * linear.front().score >= others.front().score);
+  const double by_linear = linear.empty() ? 0 : clearly * linear.front().score;
+  const bool favours_linear = others.empty() || (!linear.empty() && by_linear >= others.front().score);
   fit_linear(linear);
   keep_distinct(linear);
   Trials followed;  // of the others
@@ -182,6 +189,7 @@ Trials Selection::try_one_more(const Trial& base, const Strings& hopeless) {
       done = any_leaves_nothing(linear);
     }
     if (!done || !favours_linear) {  // a decaying tone may leave nothing of what a weak drag does, and explain it worse
+      if (done) std::erase_if(others, [&](const Trial& t) { return by_linear >= t.score; });
       fit_nonlinear(problem_.progress, others, base, followed);
       done = done || any_leaves_nothing(followed);
       if (!done && !favours_linear) fit_anew(fit_problem_, linear);
@@ -213,16 +221,18 @@ Trials Selection::try_one_more(const Trial& base, const Strings& hopeless) {
 }
 
 /// Takes away again what the others made superfluous; the last one too: by way of it the others may have come to a minimum that they had missed.
-Trial Selection::without_superfluous(Trial trial) const {
+Trial Selection::without_superfluous(Trial trial) {
   for (std::size_t k = 0; trial.effects.size() > 1 && k < trial.effects.size();) {
     Strings fewer = trial.effects;
     fewer.erase(fewer.begin() + static_cast<std::ptrdiff_t>(k));
     Trial smaller = prepare(fit_problem_, trial, fewer);
     fit_fully(smaller, 6);
-    if (bic_difference(smaller, trial) < decisive)
+    if (bic_difference(smaller, trial) < decisive) {
       trial = std::move(smaller);
-    else
+      ranking_.push_back({trial.effects, trial.reduced_chi2(), bic_difference(trial, baseline_), 0, 0});
+    } else {
       ++k;
+    }
   }
   return trial;
 }
@@ -279,13 +289,8 @@ Trial Selection::challenged(Trial best) {
 }
 
 /// Whether this set was fitted, in whichever order.
-bool Selection::is_fitted(Strings set) const {
-  std::sort(set.begin(), set.end());
-  return std::any_of(ranking_.begin(), ranking_.end(), [&](const Candidate& c) {
-    Strings known = c.effects;
-    std::sort(known.begin(), known.end());
-    return known == set;
-  });
+bool Selection::is_fitted(const Strings& set) const {
+  return std::any_of(ranking_.begin(), ranking_.end(), [&](const Candidate& c) { return same_set(c.effects, set); });
 }
 
 /// A law is not found from far away where the modes of a beam are too few for its trajectory: where nothing explains what is missing, every effect is tried beside the modes that were left out too.
@@ -350,12 +355,16 @@ Trial Selection::best_set(const std::function<bool(const Trial&)>& enough) {
 
 /// Probabilities: exp(-BIC/2) over the sum of it over all.
 std::vector<Candidate> Selection::ranking() const {
-  std::vector<Candidate> ranking = ranking_;
-  double least = 0, sum = 0;
-  for (const Candidate& c : ranking) least = std::min(least, c.delta_bic);
-  for (Candidate& c : ranking) sum += c.probability = std::exp(-0.5 * (c.delta_bic - least));
+  std::vector<Candidate> all = ranking_, ranking;
+  std::stable_sort(all.begin(), all.end(), [](const Candidate& a, const Candidate& b) { return a.delta_bic < b.delta_bic; });
+  for (Candidate& c : all) {
+    const auto known = std::find_if(ranking.begin(), ranking.end(), [&](const Candidate& r) { return same_set(r.effects, c.effects); });
+    if (known == ranking.end()) ranking.push_back(std::move(c));
+    else known->score = std::max(known->score, c.score);  // what it promised where it was first looked at
+  }
+  double sum = 0;
+  for (Candidate& c : ranking) sum += c.probability = std::exp(-0.5 * (c.delta_bic - ranking.front().delta_bic));
   for (Candidate& c : ranking) c.probability /= sum;
-  std::sort(ranking.begin(), ranking.end(), [](const Candidate& a, const Candidate& b) { return a.delta_bic < b.delta_bic; });
   return ranking;
 }
 

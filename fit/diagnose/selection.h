@@ -33,7 +33,7 @@ class Selection {
   const std::vector<Trial>& tried() const { return tried_; }
   /// A set that was tried elsewhere.
   void add(Candidate candidate) { ranking_.push_back(std::move(candidate)); }
-  /// All sets that were fitted and the baseline, the best first.
+  /// All sets that were fitted and the baseline, each once as it was fitted best, the best first.
   std::vector<Candidate> ranking() const;
 
  private:
@@ -41,11 +41,11 @@ class Selection {
   void stop();
   std::vector<std::string> candidates(const std::vector<std::string>& at_work, const std::vector<std::string>& hopeless) const;
   std::vector<Trial> try_one_more(const Trial& base, const std::vector<std::string>& hopeless);
-  Trial without_superfluous(Trial trial) const;
+  Trial without_superfluous(Trial trial);
   void try_with_all_modes(std::vector<Trial>& tried);
   std::vector<Trial> rivals(const Trial& best, const std::string& member);
   Trial challenged(Trial best);
-  bool is_fitted(std::vector<std::string> set) const;
+  bool is_fitted(const std::vector<std::string>& set) const;
   void tell(const std::string& what) const {
     if (problem_.progress) problem_.progress(what);
   }

@@ -258,8 +258,8 @@ double largest_argument_of_readings(const JointProblem& joint) {
   for (std::size_t r = 0; r < joint.runs().size(); ++r) {
     if (beside.states[r].size() == 0) continue;
     const RunResidual& run = joint.runs()[r];
-    for (const Feedback& feedback : run.model().system(run.conditions(), beside.joint.theta(r), run.channels()).feedback)
-      largest = std::max(largest, (feedback.sees.row(0) * beside.states[r]).cwiseAbs().maxCoeff());
+    const Arguments arguments(run.model().system(run.conditions(), beside.joint.theta(r), run.channels()));
+    for (const Index first : arguments.first) largest = std::max(largest, (arguments.sees.value.row(first) * beside.states[r]).cwiseAbs().maxCoeff());
   }
   return largest;
 }

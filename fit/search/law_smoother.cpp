@@ -80,8 +80,6 @@ void LawSmoother::prepare(const VectorXd& theta) {
     disturb_ << by_laws, exact_.dt * MatrixXd::Identity(states_, states_).middleCols(system_.coordinates, system_.coordinates);
   }
   arguments_ = Arguments(system_);
-  before_ = gamma0_(Eigen::all, arguments_.owner);
-  behind_ = gamma1_(Eigen::all, arguments_.owner);
 }
 
 /// Laws whose force reaches a channel through the linear part.
@@ -107,24 +105,62 @@ VectorXd LawSmoother::enough_to_move(const VectorXd& theta) {
 /// Forces of the laws along the trajectory, and their derivatives.
 void LawSmoother::look_at_laws(const VectorXd& theta) {
   force_ = MatrixXd::Zero(laws_, samples_);
-  slope_ = MatrixXd::Zero(arguments_.count(), samples_);
+  answer_ = MatrixXd::Zero(laws_, arguments_.count() * samples_);
   law_partial_ = MatrixXd::Zero(laws_, changes_ * samples_);
   if (!followed_) {
     state_ = MatrixXd::Zero(states_, samples_);
     offset_ = VectorXd::Zero(channels_);
     return;
   }
-  const MatrixXd seen = arguments_.sees * state_;
-  for (Index k = 0; k < samples_; ++k)
+  for (Index k = 0; k < samples_; ++k) answer_at(k, theta);
+}
+
+/// The forces at one sample, f = law(sees x + sees_input [u; f]), by Newton's method where a law sees them itself; and how they answer to a change of the state and of theta.
+void LawSmoother::answer_at(Index k, const VectorXd& theta) {
+  constexpr int most = 20;
+  constexpr double arrived = 1e-12;
+  const Index arguments = arguments_.count(), given = system_.B.cols() - laws_;
+  const MatrixXd of_forces = arguments_.sees_input.value.rightCols(laws_);
+  VectorXd known = arguments_.sees.value * state_.col(k);
+  if (given > 0) known += arguments_.sees_input.value.leftCols(given) * inputs_.row(k).transpose();
+  auto force = force_.col(k);
+  auto partial = law_partial_.middleCols(k * changes_, changes_);
+  MatrixXd slope = MatrixXd::Zero(laws_, arguments);
+  Eigen::PartialPivLU<MatrixXd> beside_forces;  // 1 - slope sees_input, over the forces
+  for (int step = 0; step < (arguments_.accelerations ? most : 1); ++step) {
+    const VectorXd seen = known + of_forces * force;
+    VectorXd law(laws_);
     for (Index i = 0; i < laws_; ++i) {
       const Feedback& f = system_.feedback[static_cast<std::size_t>(i)];
       const Index first = arguments_.first[static_cast<std::size_t>(i)];
-      const FeedbackForce at_z = force_of(f, seen.col(k).data() + first, theta);
-      force_(i, k) = at_z.value;
-      for (Index a = 0; a < f.sees.rows(); ++a) slope_(first + a, k) = at_z.slope[static_cast<std::size_t>(a)];
+      const FeedbackForce at_z = force_of(f, seen.data() + first, theta);
+      law[i] = at_z.value;
+      for (Index a = 0; a < f.sees.rows(); ++a) slope(i, first + a) = at_z.slope[static_cast<std::size_t>(a)];
       for (Index a = 0; a < changes_; ++a)
-        if (const Index own = parameters_[static_cast<std::size_t>(a)] - f.first_parameter; own >= 0 && own < f.parameters) law_partial_(i, k * changes_ + a) = at_z.partial[static_cast<std::size_t>(own)];
+        if (const Index own = parameters_[static_cast<std::size_t>(a)] - f.first_parameter; own >= 0 && own < f.parameters) partial(i, a) = at_z.partial[static_cast<std::size_t>(own)];
     }
+    if (!arguments_.accelerations) {
+      force = law;
+      break;
+    }
+    beside_forces.compute(MatrixXd::Identity(laws_, laws_) - slope * of_forces);
+    const VectorXd change = beside_forces.solve(law - force);
+    force += change;
+    if (!(change.norm() > arrived * force.norm())) break;
+  }
+  if (arguments_.accelerations) {
+    VectorXd inputs(given + laws_);
+    if (given > 0) inputs.head(given) = inputs_.row(k).transpose();
+    inputs.tail(laws_) = force;
+    for (Index a = 0; a < changes_; ++a) {
+      const Index j = parameters_[static_cast<std::size_t>(a)];
+      if (arguments_.sees.depends_on(j)) partial.col(a) += slope * (arguments_.sees.d(j) * state_.col(k));
+      if (arguments_.sees_input.depends_on(j)) partial.col(a) += slope * (arguments_.sees_input.d(j) * inputs);
+    }
+    partial = beside_forces.solve(partial).eval();
+    slope = beside_forces.solve(slope).eval();
+  }
+  answer_.middleCols(k * arguments, arguments) = slope;
 }
 
 /// What a change of theta does to every step along the trajectory, at fixed forces: a column per step, parameter below parameter.
@@ -158,19 +194,17 @@ MatrixXd LawSmoother::moved_by_theta() const {
 /// x_{k+1} near the trajectory, where the force at the end of the step is solved for.
 void LawSmoother::write_step(Index k, const Eigen::Ref<const MatrixXd>& moved) {
   const Index given = system_.B.cols() - laws_;
-  const auto now = slope_.col(k), then = slope_.col(k + 1);
-  const MatrixXd& sees = arguments_.sees;
+  const MatrixXd before = gamma0_ * answer(k), behind = gamma1_ * answer(k + 1);
+  const MatrixXd& sees = arguments_.sees.value;
   MatrixXd& step = ahead_[static_cast<std::size_t>(k)];
   step.resize(states_, states_ + disturbances_ + changes_ + 1);
-  step.leftCols(states_) = exact_.transition.value + before_ * now.asDiagonal() * sees;
+  step.leftCols(states_) = exact_.transition.value + before * sees;
   step.middleCols(states_, disturbances_) = disturb_;
   step.middleCols(states_ + disturbances_, changes_) = moved + gamma0_ * law_partials(k) + gamma1_ * law_partials(k + 1);
-  step.rightCols(1) = gamma0_ * force_.col(k) - before_ * now.cwiseProduct(sees * state_.col(k)) + gamma1_ * force_.col(k + 1) - behind_ * then.cwiseProduct(sees * state_.col(k + 1));
+  step.rightCols(1) = gamma0_ * force_.col(k) - before * (sees * state_.col(k)) + gamma1_ * force_.col(k + 1) - behind * (sees * state_.col(k + 1));
   if (given > 0) step.rightCols(1) += exact_.input0.value.leftCols(given) * inputs_.row(k).transpose() + exact_.input1.value.leftCols(given) * inputs_.row(k + 1).transpose();
-  if (followed_ && laws_ > 0) {  // (1 - gamma1 slope sees)^-1, of low rank
-    const MatrixXd pushed = behind_ * then.asDiagonal();
-    step += pushed * (MatrixXd::Identity(pushed.cols(), pushed.cols()) - sees * pushed).partialPivLu().solve(sees * step);
-  }
+  if (followed_ && laws_ > 0)  // (1 - gamma1 slope sees)^-1, of low rank
+    step += behind * (MatrixXd::Identity(behind.cols(), behind.cols()) - sees * behind).partialPivLu().solve(sees * step);
 }
 
 /// A reading near the trajectory, in units of its noise, over [x | change | offsets | right].
@@ -178,8 +212,8 @@ void LawSmoother::write_reading(Index k, Index channel, Eigen::Ref<RowVectorXd> 
   const double w = weight_(k, channel);
   const Index given = system_.B.cols() - laws_;
   const auto direct = system_.D.value.row(channel).tail(laws_);
-  const RowVectorXd by_argument = direct(arguments_.owner).cwiseProduct(slope_.col(k).transpose());
-  row.head(states_) = w * (system_.C.value.row(channel) + by_argument * arguments_.sees);
+  const RowVectorXd by_argument = direct * answer(k);
+  row.head(states_) = w * (system_.C.value.row(channel) + by_argument * arguments_.sees.value);
   for (Index a = 0; a < changes_; ++a) {
     const Index j = parameters_[static_cast<std::size_t>(a)];
     double change = direct.dot(law_partials(k).col(a));
@@ -188,7 +222,7 @@ void LawSmoother::write_reading(Index k, Index channel, Eigen::Ref<RowVectorXd> 
     row[states_ + a] = w * change;
   }
   row[states_ + changes_ + channel] = w;
-  double known = direct.dot(force_.col(k)) - by_argument.dot(arguments_.sees * state_.col(k));
+  double known = direct.dot(force_.col(k)) - by_argument.dot(arguments_.sees.value * state_.col(k));
   if (given > 0) known += system_.D.value.row(channel).head(given).dot(inputs_.row(k));
   row[row.size() - 1] = w * (measured_(k, channel) - known);
 }

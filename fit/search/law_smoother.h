@@ -58,7 +58,9 @@ class LawSmoother {
   Eigen::MatrixXd moved_by_theta() const;
   void write_step(Eigen::Index k, const Eigen::Ref<const Eigen::MatrixXd>& moved);
   void write_reading(Eigen::Index k, Eigen::Index channel, Eigen::Ref<Eigen::RowVectorXd> row) const;
+  void answer_at(Eigen::Index k, const Eigen::VectorXd& theta);
   auto law_partials(Eigen::Index k) const { return law_partial_.middleCols(k * changes_, changes_); }
+  auto answer(Eigen::Index k) const { return answer_.middleCols(k * arguments_.count(), arguments_.count()); }
 
   const RunResidual& run_;
   std::vector<Eigen::Index> parameters_;
@@ -68,12 +70,12 @@ class LawSmoother {
   ExactStep exact_;
   Eigen::Index readings_ = 0, parts_ = 1, samples_ = 0, channels_ = 0, changes_ = 0, states_ = 0, laws_ = 0, disturbances_ = 0;
   Eigen::MatrixXd gamma0_, gamma1_, disturb_;
-  Eigen::MatrixXd before_, behind_;  ///< gamma0_ and gamma1_ with a column per argument
   Arguments arguments_;
 
   bool followed_ = false;
   Eigen::MatrixXd state_, disturbance_;         ///< n x samples, disturbances x (samples - 1)
-  Eigen::MatrixXd force_, slope_, law_partial_; ///< of the laws along it; slopes by argument
+  Eigen::MatrixXd force_, law_partial_;         ///< of the laws along it
+  Eigen::MatrixXd answer_;                      ///< by how much they change with what the laws see: laws x (arguments samples)
   Eigen::VectorXd offset_;
 
   // Of the last linearisation: x_{k+1} over [x_k | w_k | change of theta | 1]; w_k over [w_k | x_k | change | offsets | right]; the start over [free

@@ -139,7 +139,7 @@ TEST(LawFile, SaysWhatIsWrongAndWhere) {
       {file_of("-c * x", "c = { lower = \"1 N\" }\n"), "parameters.c.start"},
       {file_of("-c * z", c), "wanted memory ="},
       {file_of("-c * x", c, "memory = \"v\"\n"), "a memory that the force does not use"},
-      {file_of("-c * x * a", c), "but not as a mass"},
+      {file_of("-c * z", c, "memory = \"v + a\"\n"), "the acceleration a in `memory`"},
       {file_of("-c", c), "a force that is always the same"},
       {file_of("-c * x", c, "", "nowhere"), "wanted one of normal, torsion, lift, gauge, mount"},
       {file_of("-c * x", c) + "[scales]\nv = \"1 m/s\"\n", "a scale of v, which the law does not use"},
@@ -262,7 +262,8 @@ TEST(LawEffect, DerivativesOfTheResponseAreSlopesInEveryPlace) {
   const std::string c = "c = { start = 1 }\n";
   for (const std::string& text : {file_of("-c * tanh(300 * x) * (1 + 20 * v) + theta * twist", c), file_of("-c * twist^3 - c * twist_rate * theta_rate", c, "", "torsion"), file_of("c * alpha^3 * U^2", c, "", "lift"),
                                   file_of("c * x * z", c, "memory = \"30 * alpha - 2 * z\"\n", "lift"), file_of("c * v^2 + c * t", c, "", "gauge"), file_of("c * sin(20 * t) + x * c^2", c, "", "mount"), file_of("-c * a", c),
-                                  file_of("-c * a - 1e9 * x^3", c), file_of("-c * z^3", c, "memory = \"1000 * v - z\"\n"), file_of("-0.1 * c * a", c, "", "lift"), file_of("c * a * 1e-3", c, "", "gauge")}) {
+                                  file_of("-c * a - 1e9 * x^3", c), file_of("-c * z^3", c, "memory = \"1000 * v - z\"\n"), file_of("-0.1 * c * a", c, "", "lift"), file_of("c * a * 1e-3", c, "", "gauge"),
+                                  file_of("-c * a * (1 + 1e5 * x^2)", c), file_of("-c * abs(a) * a * 0.1 + c * x * z", c, "memory = \"30 * alpha - 2 * z\"\n"), file_of("-c * a * twist * 100", c, "", "lift")}) {
     const AeroelasticModel model = beam({text});
     VectorXd theta = model.start_values();
     theta.tail(1)[0] = 0.4;
@@ -329,6 +330,10 @@ TEST(LawEffect, MovesARigAsAnotherIntegratorDoes) {
   compare(simulated({drag, hard}, samples), integrated([](double x, double v, double, double) { return -2 * std::abs(v) * v - 2e5 * x * x * x; }, none, samples));
   compare(simulated({file_of("c * t * sin(7 * t) - 0.5 * v", "c = { start = 1 }\n")}, samples), integrated([](double, double v, double t, double) { return t * std::sin(7 * t) - 0.5 * v; }, none, samples));
   compare(simulated({file_of("-m * a - k * x^3", "m = { start = \"0.7 kg\" }\nk = { start = \"2e5 N/m^3\" }\n")}, samples), integrated([](double x, double, double, double) { return -2e5 * x * x * x; }, none, samples, 0.7));
+  // Mass that grows with the amplitude and with time: (m + M) q'' = -k q.
+  const auto heavier = [](double x, double more) { return stiffness * x - mass / (mass + more) * stiffness * x; };
+  compare(simulated({file_of("-m * a * x^2", "m = { start = \"1500 kg/m^2\" }\n")}, samples), integrated([&](double x, double, double, double) { return heavier(x, 1500 * x * x); }, none, samples));
+  compare(simulated({file_of("-m * a * (1 - exp(-t))", "m = { start = \"0.7 kg\" }\n")}, samples), integrated([&](double x, double, double t, double) { return heavier(x, 0.7 * (1 - std::exp(-t))); }, none, samples));
   compare(simulated({file_of("-k * x * (1 + z^2)", "k = { start = \"100 N/m\" }\n", "memory = \"20 * v - 3 * z\"\n")}, samples),
           integrated([](double x, double, double, double z) { return -100 * x * (1 + z * z); }, [](double, double v, double z) { return 20 * v - 3 * z; }, samples));
 }
