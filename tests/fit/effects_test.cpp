@@ -24,7 +24,7 @@ FitProblem campaign(const std::string& folder, const std::string& name, const st
 }
 
 /// Every parameter within three of its standard errors of the key, and every run down to the noise (the bounds that the project promises).
-void expect_recovered(const std::string& name, const std::string& effect_id, const std::map<std::string, double>& effect_truth, const std::string& folder = campaigns) {
+FitResult expect_recovered(const std::string& name, const std::string& effect_id, const std::map<std::string, double>& effect_truth, const std::string& folder = campaigns) {
   const nlohmann::json key = nlohmann::json::parse(read_text(folder + "KEY.json"))[name];
   std::map<std::string, double> truth = {{"normal.stiffness_scale", key["truth"]["kn"]},
                                          {"torsion.stiffness_scale", key["truth"]["kt"]},
@@ -48,6 +48,7 @@ void expect_recovered(const std::string& name, const std::string& effect_id, con
   }
   EXPECT_EQ(seen, truth.size());
   for (const FittedRun& run : result.runs) EXPECT_LT(run.reduced_chi2(), 1.2) << run.file;
+  return result;
 }
 
 TEST(FittedEffects, TankWaveIsRecovered) {
@@ -74,6 +75,33 @@ TEST(FittedEffects, TheBendOfTheLiftCurveIsRecovered) {
   const std::string folder = test::shared_path("campaigns/open2/");
   const nlohmann::json truth = nlohmann::json::parse(read_text(folder + "KEY.json"))["o4"]["parameters"];
   expect_recovered("o4", "lift-curve", {{"lift-curve.bend", truth["cubic_lift"]}}, folder);
+}
+
+/// Three steps of a carriage that surges, at two speeds, with what stood before the motion; the simulator scales the loads of the strips one by one.
+TEST(FittedEffects, TheSurgeOfTheSpeedIsRecovered) {
+  UNRIG_NEEDS_SHARED("campaigns/open2");
+  const std::string folder = test::shared_path("campaigns/open2/");
+  const nlohmann::json key = nlohmann::json::parse(read_text(folder + "KEY.json"))["o8"];
+  std::map<std::string, double> truth{{"speed-surge.frequency", key["parameters"]["surge_hz"]}};
+  const FitResult result = expect_recovered("o8", "speed-surge", truth, folder);
+  for (const std::string step : {"step_a", "step_b", "step_c"}) {
+    const auto steady = std::find_if(result.parameters.begin(), result.parameters.end(),
+                                     [&](const FittedParameter& p) { return p.name == "speed-surge.steady_normal_force" && p.run.find(step) != std::string::npos; });
+    ASSERT_NE(steady, result.parameters.end()) << step;
+    EXPECT_LT(std::abs(steady->value - key["runs"][step]["cn0"].get<double>()), 3 * steady->std_error) << step;
+    EXPECT_LT(steady->std_error, 0.02 * steady->value) << step;
+  }
+}
+
+/// A decay in water and three steps while the rig fills. The key tells the mass as a share of that which moves in the first mode.
+TEST(FittedEffects, TheMassThatComesInIsRecovered) {
+  UNRIG_NEEDS_SHARED("campaigns/open2");
+  const std::string folder = test::shared_path("campaigns/open2/");
+  const nlohmann::json truth = nlohmann::json::parse(read_text(folder + "KEY.json"))["o9"]["parameters"];
+  const Rig rig = read_rig(folder + "o9/rig.toml");
+  const Basis basis = make_basis(rig, Eigen::Index{5}, Eigen::Index{1});
+  const double shape = basis.normal(rig.loaded_element() - 1, 0), moving = 1 / (shape * shape);  // modes of unit generalised mass
+  expect_recovered("o9", "filling-mass", {{"filling-mass.mass", truth["mass_gain_share"].get<double>() * moving}, {"filling-mass.time", truth["fill_tau_s"]}}, folder);
 }
 
 /// Finite span in mains hum: the build-up of circulation is the one with which the campaign was made, within its errors, which are small beside what it is off Wagner's.
