@@ -54,7 +54,8 @@ Effect mains_hum() {
     }
     DualMatrix F(c.parameter(0) * turn, c.theta.size());
     F.add_partial(c.first_parameter, turn);
-    append_reading(system, F, c.gauge, DualMatrix(read, c.theta.size()));
+    const Eigen::Index first = append_reading(system, F, c.gauge, DualMatrix(read, c.theta.size()));
+    for (Eigen::Index k = 0; k < harmonics; ++k) system.parts.push_back({first + 2 * k, first + 2 * k + 1});
   };
   return e;
 }

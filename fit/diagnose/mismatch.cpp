@@ -18,6 +18,7 @@ using Eigen::VectorXcd;
 using Eigen::VectorXd;
 
 constexpr double significant = 1e-3;
+constexpr double of_tests = 3;  // Bonferroni
 constexpr double beyond_motion = 1.05;  // a motion that is known to its noise leaves up to a twentieth
 
 double upper_normal(double z) { return 0.5 * std::erfc(z / std::sqrt(2.0)); }
@@ -56,6 +57,14 @@ bool is_noise(const RunResidual& run, const VectorXd& left) {
   return whiteness({resting}) > significant && evenness(resting) > significant;
 }
 
+/// What is left of one channel.
+struct Left {
+  std::size_t run;
+  VectorXd residual;  // over the noise
+  Line line;
+  double p_but_for_line;
+};
+
 bool is_linear(const RunResidual& run, const VectorXd& theta) { return run.model().system(run.conditions(), theta, run.channels()).feedback.empty(); }
 
 /// "growing with the motion": how the r.m.s. of the excess goes with that of the gauge's own swing from run to run, where three or more runs tell.
@@ -91,6 +100,14 @@ std::string describe(const RunResidual& run, const VectorXd& left, Mismatch& mis
   return text;
 }
 
+/// "step_a.csv has a line at 60.0 Hz, of 25 times the power that its noise has there".
+std::string describe_line(const RunResidual& run, const Line& line, Mismatch& mismatch) {
+  const double dt = run.run().dt, frequency = line.place / dt, half_width = 0.5 / (dt * static_cast<double>(run.run().samples()));
+  mismatch.time.push_back({run.run().time(0), run.run().time(run.run().samples() - 1)});
+  mismatch.frequency.push_back({frequency - half_width, frequency + half_width});
+  return fmt::format("{} has a line at {:.3g} Hz, of {:.2g} times the power that its noise has there", base_name(run.run().file), frequency, line.over_mean);
+}
+
 }  // namespace
 
 std::string in_words_of_power(double exponent) {
@@ -103,8 +120,7 @@ std::string in_words_of_power(double exponent) {
 
 Mismatch locate_mismatch(const JointProblem& joint) {
   Mismatch mismatch;
-  std::vector<VectorXd> residuals;
-  std::vector<std::size_t> owner;
+  std::vector<Left> all;
   for (std::size_t r = 0; r < joint.runs().size(); ++r) {
     const RunResidual& run = joint.runs()[r];
     if (run.is_aside()) continue;
@@ -117,11 +133,12 @@ Mismatch locate_mismatch(const JointProblem& joint) {
       m.energy = left.squaredNorm() / count;
       const double freedom = count - static_cast<double>(run.linear_unknowns());
       const double energy_p = upper_normal((left.squaredNorm() - freedom) / std::sqrt(2 * freedom) / beyond_motion - (beyond_motion - 1) * std::sqrt(freedom / 2));
-      m.p_value = std::min(1.0, is_noise(run, left) ? 2 * whiteness({left}) : 2 * std::min(energy_p, whiteness({left})));
+      const Line line = strongest_line(left);
+      const double but_for_line = std::min(is_noise(run, left) ? 1.0 : energy_p, whiteness({left}));
+      m.p_value = std::min(1.0, of_tests * std::min(but_for_line, line.p_value));
       m.excess = std::max(0.0, left.squaredNorm() - freedom);
       mismatch.channels.push_back(m);
-      residuals.push_back(std::move(left));
-      owner.push_back(r);
+      all.push_back({r, std::move(left), line, but_for_line});
     }
   }
   const auto tests = static_cast<double>(mismatch.channels.size());
@@ -129,15 +146,16 @@ Mismatch locate_mismatch(const JointProblem& joint) {
   std::vector<double> swing, excess;
   for (std::size_t i = 0; i < mismatch.channels.size(); ++i) {
     const ChannelMismatch& m = mismatch.channels[i];
-    const double corrected = std::min(1.0, tests * m.p_value);
-    mismatch.p_value = std::min(mismatch.p_value, corrected);
-    if (corrected >= significant || m.energy < beyond_motion) continue;
+    mismatch.p_value = std::min(mismatch.p_value, tests * m.p_value);
+    const auto is_seen = [&](double p_value) { return tests * of_tests * p_value < significant; };
+    const bool is_loud = m.energy >= beyond_motion && is_seen(all[i].p_but_for_line);
+    if (!is_loud && !is_seen(all[i].line.p_value)) continue;
     mismatch.found = true;
     mismatch.runs.push_back(m.run);
-    const RunResidual& run = joint.runs()[owner[i]];
-    const VectorXd theta = joint.theta(owner[i]);
-    std::string text = describe(run, residuals[i], mismatch);
-    mismatch.state.push_back(is_linear(run, theta) ? depends_on(run_states(run, run.predict(theta), theta), residuals[i]) : std::nullopt);
+    const RunResidual& run = joint.runs()[all[i].run];
+    const VectorXd theta = joint.theta(all[i].run);
+    std::string text = is_loud ? describe(run, all[i].residual, mismatch) : describe_line(run, all[i].line, mismatch);
+    mismatch.state.push_back(is_linear(run, theta) ? depends_on(run_states(run, run.predict(theta), theta), all[i].residual) : std::nullopt);
     if (mismatch.state.back()) text += ", " + sentence(*mismatch.state.back());
     if (const VectorXd& read = run.run().channel(m.channel).value; m.channel == run.channels().front() && read.allFinite()) {
       swing.push_back(std::sqrt((read.array() - read.mean()).square().mean()));

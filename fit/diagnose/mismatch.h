@@ -13,7 +13,7 @@ namespace unrig {
 struct ChannelMismatch {
   std::string run, channel;
   double energy = 0;      ///< residual power over noise power
-  double p_value = 1;     ///< probability that noise alone leaves as much, or as coloured: the lesser of two tests, twice
+  double p_value = 1;     ///< probability that noise alone leaves as much, as coloured or as strong a line: the least of three tests, three times
   double excess = 0;      ///< energy above the noise, times samples
 };
 
@@ -33,8 +33,8 @@ struct Mismatch {
 std::string in_words_of_power(double exponent);
 
 /// Runs that are set aside are not asked. Energy: residual power against the white part of the residual itself, estimated from differences, which do not see a smooth mismatch. Colour: Bartlett's test of the
-/// cumulative periodogram. A mismatch is found where the p-value, corrected for the number of channels, is below 1e-3 and the residual's power exceeds the noise's
-/// by more than 5 %: a motion that is known to its noise leaves up to that.
+/// cumulative periodogram. A line: Fisher's test of the largest. A mismatch is found where the p-value, corrected for the number of channels, is below 1e-3 and it is a line's or the residual's power exceeds the noise's
+/// by more than 5 %: a motion that is known to its noise leaves up to that, and no line.
 Mismatch locate_mismatch(const JointProblem& joint);
 
 }  // namespace unrig

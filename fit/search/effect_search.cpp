@@ -42,25 +42,48 @@ struct LeftOfRun {
   Index unknowns = 0;      // linear ones that its readings tell of
 };
 
-/// Linear unknowns of a run that count: of the states in which filters of the gauge start, those combinations that the readings know better than the swing of the reading itself tells. What a fast
-/// filter was in has died out before a sample shows it.
-Index told_unknowns(const RunResidual& run, const VectorXd& theta, const RunResidual::Prediction& p) {
-  const std::vector<Index> settling = run.model().system(run.conditions(), theta, run.channels()).settling;
-  std::vector<Index> order, own;
-  for (Index i = 0; i < run.linear_unknowns(); ++i) {
-    const Index state = i - run.motion().unknowns();
-    const bool is_state = state >= 0 && state < static_cast<Index>(run.free_states().size());
-    const bool is_filter = is_state && std::find(settling.begin(), settling.end(), run.free_states()[static_cast<std::size_t>(state)]) != settling.end();
-    (is_filter ? own : order).push_back(i);
-  }
-  if (own.empty()) return run.linear_unknowns();
-  const auto count = static_cast<Index>(own.size());
-  order.insert(order.end(), own.begin(), own.end());
+/// What the readings say of some of the linear unknowns c, whatever the others are: residual = triangle (c - estimate).
+struct Known {
+  MatrixXd triangle;
+  VectorXd estimate;
+};
+Known known_of(const RunResidual::Prediction& p, const std::vector<Index>& some) {
+  std::vector<Index> order;
+  for (Index i = 0; i < p.linear.size(); ++i)
+    if (std::find(some.begin(), some.end(), i) == some.end()) order.push_back(i);
+  order.insert(order.end(), some.begin(), some.end());
+  const auto count = static_cast<Index>(some.size());
   const MatrixXd triangle = Eigen::HouseholderQR<MatrixXd>(p.linear_factor(Eigen::all, order)).matrixQR().triangularView<Eigen::Upper>();
-  const VectorXd reading = p.output.col(0).array() - p.output.col(0).mean();
-  const double swing = reading.norm() / std::sqrt(static_cast<double>(reading.size()));
-  const VectorXd told = swing * Eigen::JacobiSVD<MatrixXd>(triangle.bottomRightCorner(count, count)).singularValues();
-  return run.linear_unknowns() - count + (told.array() > 1).count();
+  return {triangle.block(p.linear.size() - count, p.linear.size() - count, count, count), p.linear(some)};
+}
+
+/// Places in c of those of these states that are unknown where the run begins.
+std::vector<Index> places_of(const RunResidual& run, const std::vector<Index>& states) {
+  std::vector<Index> places;
+  for (std::size_t i = 0; i < run.free_states().size(); ++i)
+    if (std::find(states.begin(), states.end(), run.free_states()[i]) != states.end()) places.push_back(run.motion().unknowns() + static_cast<Index>(i));
+  return places;
+}
+
+/// Linear unknowns of a run that count. Of the states in which filters of the gauge start, those combinations that the readings know better than the swing of the reading itself tells: what a fast filter was
+/// in has died out before a sample shows it. Of the parts of a signal (LinearSystem::parts) those without which the evidence were less: what the others take of chi-square is left of the run instead.
+void count_unknowns(const RunResidual& run, const VectorXd& theta, const RunResidual::Prediction& p, double log_samples, LeftOfRun& left) {
+  left.unknowns = run.linear_unknowns();
+  const LinearSystem system = run.model().system(run.conditions(), theta, run.channels());
+  if (const std::vector<Index> filters = places_of(run, system.settling); !filters.empty()) {
+    const VectorXd reading = p.output.col(0).array() - p.output.col(0).mean();
+    const double swing = reading.norm() / std::sqrt(static_cast<double>(reading.size()));
+    const VectorXd told = swing * Eigen::JacobiSVD<MatrixXd>(known_of(p, filters).triangle).singularValues();
+    left.unknowns -= static_cast<Index>(filters.size()) - (told.array() > 1).count();
+  }
+  for (const std::vector<Index>& part : system.parts) {
+    const std::vector<Index> places = places_of(run, part);
+    const Known known = known_of(p, places);
+    const double takes = (run.tempered() * (known.triangle * known.estimate)).squaredNorm(), costs = static_cast<double>(places.size()) * log_samples;
+    if (takes > costs) continue;
+    left.unknowns -= static_cast<Index>(places.size());
+    left.variance += takes / left.samples;
+  }
 }
 
 /// A law that is missing bends the motion too, within the noise of the angle.
@@ -78,6 +101,9 @@ void look_at_angle(const RunResidual& run, const RunResidual::Prediction& p, Lef
 
 std::vector<LeftOfRun> left_of_runs(const JointProblem& joint) {
   std::vector<LeftOfRun> all(joint.runs().size());
+  double of_all = 0;
+  for (const RunResidual& run : joint.runs()) of_all += static_cast<double>(run.run().samples());
+  const double log_samples = std::log(of_all);
   in_parallel(all.size(), [&](std::size_t r) {
     const RunResidual& run = joint.runs()[r];
     const auto every_sample = static_cast<double>(run.run().samples());
@@ -102,7 +128,7 @@ std::vector<LeftOfRun> left_of_runs(const JointProblem& joint) {
     }
     all[r].variance = power / all[r].samples;
     look_at_angle(run, p, all[r]);
-    all[r].unknowns = told_unknowns(run, joint.theta(r), p);
+    count_unknowns(run, joint.theta(r), p, log_samples, all[r]);
   });
   return all;
 }

@@ -163,4 +163,19 @@ double whiteness(const std::vector<VectorXd>& residuals) {
   return std::min(1.0, least * static_cast<double>(residuals.size()));
 }
 
+Line strongest_line(const VectorXd& residual) {
+  constexpr Index finer = 2, least = 16;
+  const Index n = residual.size();
+  if (n < least || residual.isZero(0)) return {};
+  const VectorXd power = fourier(residual, finer * n).cwiseAbs2();
+  const double independent = static_cast<double>(n) / 2;
+  Index at = 0;
+  const double most = power.segment(finer, power.size() - 2 * finer).maxCoeff(&at);  // neither the mean nor the last
+  Line line;
+  line.place = static_cast<double>(at + finer) / static_cast<double>(finer * n);
+  line.over_mean = most / residual.squaredNorm();
+  line.p_value = std::min(1.0, static_cast<double>(finer) * independent * std::pow(std::max(0.0, 1 - line.over_mean / independent), independent - 1));
+  return line;
+}
+
 }  // namespace unrig

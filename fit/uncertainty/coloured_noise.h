@@ -51,6 +51,15 @@ Eigen::VectorXd residual_at_rest(const Eigen::VectorXd& residual, const std::vec
 /// most coloured of the channels, times the number of channels. Left-out samples are 0.
 double whiteness(const std::vector<Eigen::VectorXd>& residuals);
 
+/// The strongest line of a residual, looked for at every half of the resolution of its record.
+struct Line {
+  double place = 0;     ///< frequency over that of the samples
+  double over_mean = 0; ///< its power over the mean of all
+  double p_value = 1;   ///< probability that white noise has one as strong: R. A. Fisher, Proc. R. Soc. A 125 (1929) 54, the first term, which bounds it, for twice as many lines
+};
+/// Left-out samples are 0; none of a record of less than sixteen samples.
+Line strongest_line(const Eigen::VectorXd& residual);
+
 /// Probability that independent noise of one distribution, whatever its level and tails, comes as unevenly over the record: sums of its size about the mean, held against a Brownian bridge (R. L. Brown, J. Durbin and
 /// J. M. Evans, J. Royal Statistical Society B 37 (1975) 149). Of the absolute value, which has a variance where squares have none. Left-out samples are 0.
 double evenness(const Eigen::VectorXd& residual);

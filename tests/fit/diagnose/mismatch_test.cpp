@@ -29,21 +29,29 @@ struct AtTheTruth {
   Mismatch mismatch() const { return locate_mismatch(JointProblem(model, residuals)); }
 };
 
-/// What a model that leaves out a tone of this amplitude is left with, in units of the noise.
+/// What a model that leaves out a tone of this amplitude, or a band of tones with its power, is left with, in units of the noise.
 VectorXd with_tone(Index samples, double amplitude, unsigned seed) { return 0.01 * (one_mode::white_noise(samples, seed) + amplitude * one_mode::tone(samples, 20)); }
 
-Mismatch of_tone(Index samples, double amplitude) {
-  AtTheTruth t;
-  t.add(with_tone(samples, amplitude, 7));
-  return t.mismatch();
+VectorXd with_band(Index samples, double amplitude, unsigned seed) {
+  constexpr int tones = 41;
+  VectorXd band = VectorXd::Zero(samples);
+  for (int i = 0; i < tones; ++i) band += one_mode::tone(samples, 15.03 + 0.26 * i);
+  return 0.01 * (one_mode::white_noise(samples, seed) + amplitude / std::sqrt(tones) * band);
 }
 
-/// The amplitude with which the tone in a single run is as unlikely as this.
+Mismatch of(const VectorXd& beside) {
+  AtTheTruth t;
+  t.add(beside);
+  return t.mismatch();
+}
+Mismatch of_band(Index samples, double amplitude) { return of(with_band(samples, amplitude, 7)); }
+
+/// The amplitude with which the band in a single run is as unlikely as this.
 double amplitude_of(double p_value, Index samples) {
   double low = 0, high = 2;
   for (int halving = 0; halving < 25; ++halving) {
     const double middle = (low + high) / 2;
-    (of_tone(samples, middle).p_value > p_value ? low : high) = middle;
+    (of_band(samples, middle).p_value > p_value ? low : high) = middle;
   }
   return high;
 }
@@ -51,7 +59,7 @@ double amplitude_of(double p_value, Index samples) {
 constexpr Index some = 500;
 
 TEST(Mismatch, IsFoundWhereNoiseLeavesAsMuchOnceInAThousandTimes) {
-  const Mismatch chance = of_tone(some, amplitude_of(3e-3, some)), found = of_tone(some, amplitude_of(3e-4, some));
+  const Mismatch chance = of_band(some, amplitude_of(3e-3, some)), found = of_band(some, amplitude_of(3e-4, some));
   ASSERT_NEAR(chance.p_value, 3e-3, 1e-4);
   ASSERT_NEAR(found.p_value, 3e-4, 1e-5);
   ASSERT_GT(chance.channels.front().energy, 1.06) << "otherwise it is the motion's share that excuses it";
@@ -61,7 +69,7 @@ TEST(Mismatch, IsFoundWhereNoiseLeavesAsMuchOnceInAThousandTimes) {
 
 TEST(Mismatch, OneChannelOfManyMustBeAsManyTimesLessLikely) {
   AtTheTruth alone, among_others;
-  const VectorXd beside = with_tone(some, amplitude_of(2e-4, some), 7);
+  const VectorXd beside = with_band(some, amplitude_of(2e-4, some), 7);
   alone.add(beside);
   ASSERT_TRUE(alone.mismatch().found);
   among_others.add(beside);
@@ -77,12 +85,25 @@ TEST(Mismatch, OneChannelOfManyMustBeAsManyTimesLessLikely) {
 /// Forty thousand samples show a fortieth of the noise's power without any doubt; a motion that is known to its noise leaves up to a twentieth.
 TEST(Mismatch, IsNoneWithinATwentiethOfTheNoise) {
   constexpr Index many = 40000;
-  const Mismatch little = of_tone(many, std::sqrt(2 * 0.025)), more = of_tone(many, std::sqrt(2 * 0.08));
+  const Mismatch little = of_band(many, std::sqrt(2 * 0.025)), more = of_band(many, std::sqrt(2 * 0.08));
   ASSERT_NEAR(little.channels.front().energy, 1.025, 0.015);  // a hundredth is how well so many samples tell the noise and what is left
   ASSERT_NEAR(more.channels.front().energy, 1.08, 0.015);
   EXPECT_LT(little.p_value, 1e-6);
   EXPECT_FALSE(little.found);
   EXPECT_TRUE(more.found);
+}
+
+/// A line is no part of what a motion leaves: a fiftieth of the noise's power in one is found, and said where.
+TEST(Mismatch, IsFoundInALineHoweverFaint) {
+  constexpr Index many = 3000;
+  const Mismatch line = of(with_tone(many, 0.2, 7)), none = of(with_tone(many, 0, 7));
+  ASSERT_LT(line.channels.front().energy, 1.05) << "otherwise its power is seen";
+  EXPECT_TRUE(line.found);
+  EXPECT_NE(line.summary.find("a line at 20 Hz"), std::string::npos) << line.summary;
+  ASSERT_EQ(line.frequency.size(), 1u);
+  EXPECT_NEAR(line.frequency.front()[0], 20, 1 / (one_mode::dt * many));
+  EXPECT_NEAR(line.frequency.front()[1], 20, 1 / (one_mode::dt * many));
+  EXPECT_FALSE(none.found);
 }
 
 /// p value of a run whose noise is `reading`, held against the noise level of a quiet one.

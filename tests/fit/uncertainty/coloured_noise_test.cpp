@@ -89,5 +89,33 @@ TEST(ColouredNoise, WhatNoiseDoesToAnOffsetIsThatOfAllSamplesAndUnknowns) {
   }
 }
 
+/// Of 2000 records of white noise as many as its probability says have so strong a line: it is a bound, which looks between the lines as well.
+TEST(StrongestLine, IsAsRareInWhiteNoiseAsItSays) {
+  constexpr int records = 2000;
+  for (const double level : {0.1, 0.01}) {
+    int rarer = 0;
+    for (unsigned seed = 0; seed < records; ++seed) rarer += strongest_line(white_noise(501, 1, seed)).p_value < level ? 1 : 0;
+    const double expected = level * records, spread = 3 * std::sqrt(expected);
+    EXPECT_LT(rarer, expected + spread) << level;
+    EXPECT_GT(rarer, 0.5 * expected - spread) << level << ": half of the places between lines are not independent of them";
+  }
+}
+
+/// Wherever it lies between the lines of the record, with samples left out too.
+TEST(StrongestLine, IsFoundAtItsFrequency) {
+  constexpr Index samples = 1000;
+  for (const double cycles : {60.0, 60.25, 60.5, 141.3}) {
+    VectorXd residual = white_noise(samples, 1, 3);
+    for (Index k = 0; k < samples; ++k) residual[k] += 0.5 * std::sin(2 * 3.14159265358979323846 * cycles * static_cast<double>(k) / samples);
+    residual.segment(400, 50).setZero();
+    const Line line = strongest_line(residual);
+    EXPECT_NEAR(line.place * samples, cycles, 0.5) << cycles;
+    EXPECT_LT(line.p_value, 1e-10) << cycles;
+    EXPECT_GT(line.over_mean, 30) << cycles << ": n a^2 / 4 is 62, of which a place a quarter of a line away shows four fifths";
+  }
+  EXPECT_EQ(strongest_line(VectorXd::Zero(100)).p_value, 1);
+  EXPECT_EQ(strongest_line(white_noise(8, 1, 1)).p_value, 1);
+}
+
 }  // namespace
 }  // namespace unrig::run_cases
