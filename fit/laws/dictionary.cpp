@@ -59,6 +59,7 @@ std::vector<Line> lines() {
       {"friction of Stribeck", ActsOn::normal, "-f * (1 + r * exp(-abs(v) / s)) * tanh(v / (0.1 * s))", "", {{"f", In::force, {little}, 0}, {"r", In::number, {0.3}, -1, 10}, {"s", In::v, {0.05}, 5e-3, 2}}, {}},
       {"hysteresis of Bouc and Wen", ActsOn::normal, "-f * z", "v / xy * (1 - abs(z)^n * (b + (1 - abs(b)) * sign(v * z)))", {{"f", In::force, {more}, 0}, {"xy", In::x, {0.2, 0.05}, 1e-3, 3}, {"b", In::number, {0.5}, -1, 1}, {"n", In::number, {1}, 0.5, 4}}, {}},
       {"spring and damper in series", ActsOn::normal, "-f * z", "v - z / tau", {{"f", In::force, {10 * more}, 0}, {"tau", In::seconds, {0.01, 0.1}, 1e-4, 1}}, {v}},
+      {"mass with a power of the amplitude", ActsOn::normal, "-c * abs(x)^p * a", "", {either, power(2)}, {x, a}},
       {"stiffness that changes with time", ActsOn::normal, "-c * x * (1 - exp(-t / tau))", "", {either, {"tau", In::seconds, {0.1, 0.5}, 0.003, 30}}, {x}},
       {"damping that changes with time", ActsOn::normal, "-c * v * (1 - exp(-t / tau))", "", {either, {"tau", In::seconds, {0.1, 0.5}, 0.003, 30}}, {v}},
       {"stiffness that changes with the shaft's angle", ActsOn::normal, "-c * x * theta", "", {either}, {x}},
@@ -99,6 +100,7 @@ double scale_of(Symbol symbol, const Reach& r) {
   switch (symbol) {
     case Symbol::x: return r.x;
     case Symbol::v: return r.v;
+    case Symbol::a: return r.a;
     case Symbol::twist: return r.twist;
     case Symbol::twist_rate: return r.twist_rate;
     case Symbol::alpha: return r.alpha;
@@ -184,6 +186,7 @@ Reach reach_of(const BesideUnknownForces& beside) {
     }
     per_second = first_mode_momentum(run.model());
   }
+  if (reach.x > 0) reach.a = reach.v * reach.v / reach.x;
   reach.force = per_second * reach.v;
   const Rig& rig = joint.model().rig();
   if (!rig.is_modal() && joint.model().basis().torsion_modes > 0 && reach.twist > 0) {

@@ -17,6 +17,7 @@ struct Form {
 /// How far the runs of a fit take the states that a law may look at: largest absolute values.
 struct Reach {
   double x = 0, v = 0;               ///< m, m/s; of the first normal mode (run_states)
+  double a = 0;                      ///< m/s^2: v^2 / x, what a sine has
   double twist = 0, twist_rate = 0;  ///< rad, rad/s
   double alpha = 0;                  ///< rad, effective angle of attack, that of the shaft taken for it
   double seconds = 0;                ///< of the longest run
@@ -26,7 +27,7 @@ struct Reach {
 Reach reach_of(const BesideUnknownForces& beside);
 
 /// Formulas that a missing force may have (correct/manual/laws.md): powers of displacement, velocity and twist with a free exponent, even ones too; springs with a gap, on one side and on both; saturation, a sine, a
-/// pull across two gaps; damping that grows or falls with amplitude; dry friction, with Stribeck's decrease; hysteresis of Bouc and Wen (Dahl's with b = 0), a Maxwell element; stiffness and damping that change with time,
+/// pull across two gaps; damping that grows or falls with amplitude; dry friction, with Stribeck's decrease; hysteresis of Bouc and Wen (Dahl's with b = 0), a Maxwell element; mass that changes with amplitude; stiffness and damping that change with time,
 /// angle or speed; lift that bends; last, curves without a formula of their own. Those that nothing in these runs would move are left out.
 std::vector<Form> dictionary(const Rig& rig, const Reach& reach);
 

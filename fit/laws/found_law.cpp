@@ -14,6 +14,7 @@ FoundLaw::Learnt learnt(Symbol symbol, const Reach& r) {
   switch (symbol) {
     case Symbol::x: return {-r.x, r.x, "m"};
     case Symbol::v: return {-r.v, r.v, "m/s"};
+    case Symbol::a: return {-r.a, r.a, "m/s^2"};
     case Symbol::twist: return {-r.twist, r.twist, "rad"};
     case Symbol::twist_rate: return {-r.twist_rate, r.twist_rate, "rad/s"};
     case Symbol::alpha: return {-r.alpha, r.alpha, "rad"};

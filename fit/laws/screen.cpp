@@ -121,6 +121,8 @@ VectorXd force_along(const Law& law, const VectorXd& parameters, const MatrixXd&
   double z = 0;
   for (Index k = 0; k < states.cols(); ++k) {
     look(states.col(k), static_cast<double>(k) * dt);
+    const Index before = std::max<Index>(0, k - 1), behind = std::min(states.cols() - 1, k + 1);
+    symbol[at(Symbol::a)] = (states(1, behind) - states(1, before)) / (dt * static_cast<double>(std::max<Index>(1, behind - before)));
     symbol[at(Symbol::z)] = z;
     force[k] = law.force(symbol.data(), parameters.data(), in_symbols.data(), in_parameters.data());
     if (!law.memory || k + 1 == states.cols()) continue;

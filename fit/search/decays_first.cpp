@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "core/effects/effect.h"
+#include "core/law/law_effect.h"
 #include "core/numerics/in_parallel.h"
 #include "fit/search/arrival.h"
 #include "fit/search/law_smoother.h"
@@ -355,13 +356,29 @@ double left_as_trusted(const JointProblem& joint) {
   return trust.left_as_trusted();
 }
 
+namespace {
+
+bool acts_in_decays(const JointProblem& joint, const std::string& id) {
+  const Rig& rig = joint.model().rig();
+  return std::any_of(joint.runs().begin(), joint.runs().end(), [&](const RunResidual& run) { return is_decay(run) && effect(rig, id).acts(rig, run.conditions()); });
+}
+
+/// Whether any law does.
+bool follow_laws(const JointProblem& joint) {
+  return std::any_of(joint.runs().begin(), joint.runs().end(), [](const RunResidual& run) {
+    return is_decay(run) && !run.model().system(run.conditions(), run.model().start_values(), run.channels()).feedback.empty();
+  });
+}
+
+}  // namespace
+
 DecaysLeft fit_decays(JointProblem& joint, const std::string& id, bool from_here) {
   JointProblem start = joint;
   back_to_the_rig(start, 2);
   for (RunResidual& run : start.runs())
     if (is_decay(run)) run.temper(1);
   const std::vector<Unknown*> own = unknowns_of(start, id);
-  const double size = own.empty() ? 0 : own.front()->value;
+  const double size = own.empty() || !acts_in_decays(joint, id) ? 0 : own.front()->value;
   const auto trust = [&](double factor, int levels) {
     JointProblem sized = start;
     if (size != 0) {
@@ -400,7 +417,7 @@ DecaysLeft fit_decays(JointProblem& joint, const std::string& id, bool from_here
     return {best->left_as_trusted(), false};
   }
 
-  const std::unique_ptr<GrowingTrust> first = trust(1, GrowingTrust::all_levels);
+  const std::unique_ptr<GrowingTrust> first = trust(1, follow_laws(joint) ? GrowingTrust::all_levels : GrowingTrust::first_levels);
   JointProblem found = joint;
   const double left = follow_exactly(found, *first);
   if (left > followed && size != 0 && !from_here) {

@@ -24,7 +24,7 @@ struct DecaysLeft {
 /// a smaller and a larger size. A large trajectory that crosses the corners of a law for seconds tells errors of theta from each other as little as chance does, and has least chi-squares
 /// everywhere: of the ways to a law that takes small steps the one that leaves least is kept, and where it leaves one of the decays above its noise, the law is asked what it leaves
 /// when it is trusted to within some per cent; that holds where it is the noise, or where the model itself leaves more than half as much again.
-/// `from_here`: the start is an estimate, other sizes are not tried.
+/// `from_here`: the start is an estimate, other sizes are not tried; nor are they of an effect that acts in none of the decays.
 DecaysLeft fit_decays(JointProblem& joint, const std::string& id, bool from_here = false);
 
 /// Free decays beside unknown accelerations of every coordinate.

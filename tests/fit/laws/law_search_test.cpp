@@ -71,6 +71,12 @@ const std::vector<Hidden> hidden{
      [](double x, double) { return -0.2 * stiffness * std::max(0.0, x - 0.3); },
      {{"k", 0.2 * stiffness}, {"s", 0.3}}},
     {"damping with a power", [](double, double v) { return -1.5e-3 * std::pow(std::abs(v), 2.7) * sign(v); }, {{"p", 2.7}}},
+    {"mass with a power of the amplitude",
+     [](double x, double v) {  // (1 + m) x'' = the rig's own forces, which are those of a mass of one
+       const double m = 0.3 * std::pow(std::abs(x), 1.5);
+       return m / (1 + m) * (2 * one_mode::damping_ratio * omega * v + stiffness * x);
+     },
+     {{"p", 1.5}}},
     {"damping of van der Pol", [](double x, double v) { return 2 * 0.02 * omega * (1 - std::pow(x / 0.45, 2)) * v; }, {}},
 };
 
@@ -152,7 +158,7 @@ TEST(Screen, PutsTheTruthFirstOrSecond) {
 
 TEST(Dictionary, ReadsBackAsItIsWritten) {
   Reach reach;
-  reach.x = 0.01, reach.v = 0.3, reach.twist = 0.02, reach.twist_rate = 2, reach.alpha = 0.2, reach.seconds = 10, reach.force = 20,
+  reach.x = 0.01, reach.v = 0.3, reach.a = 9, reach.twist = 0.02, reach.twist_rate = 2, reach.alpha = 0.2, reach.seconds = 10, reach.force = 20,
   reach.moment = 0.5;
   const std::vector<Form> forms = dictionary(Rig(), reach);
   EXPECT_GT(forms.size(), 20);
