@@ -97,7 +97,7 @@ struct Diagnosis {
   double seconds = 0;
 };
 
-/// 1. The best fit with nothing missing, runs that it cannot explain weighted down; its residual is tested for energy and colour.
+/// 1. The best fit with nothing missing, runs that it cannot explain weighted down; its residual is tested for energy, colour and a single line.
 ///    Where it differs from noise and no number states an uncertainty, the rig's description is the first candidate (fit/diagnose/rig_description.h).
 /// 2. Every candidate is linearised there: how much of the residual could one step in its parameters and the rig's remove?
 /// 3. The promising ones are fitted in full, everything free, while the weights return to those of the noise. They are compared by BIC with each run's

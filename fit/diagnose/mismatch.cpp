@@ -133,7 +133,7 @@ Mismatch locate_mismatch(const JointProblem& joint) {
       m.energy = left.squaredNorm() / count;
       const double freedom = count - static_cast<double>(run.linear_unknowns());
       const double energy_p = upper_normal((left.squaredNorm() - freedom) / std::sqrt(2 * freedom) / beyond_motion - (beyond_motion - 1) * std::sqrt(freedom / 2));
-      const Line line = strongest_line(left);
+      const Line line = is_linear(run, joint.theta(r)) ? strongest_line(left) : Line();  // a law is followed in steps, which leave lines of their own
       const double but_for_line = std::min(is_noise(run, left) ? 1.0 : energy_p, whiteness({left}));
       m.p_value = std::min(1.0, of_tests * std::min(but_for_line, line.p_value));
       m.excess = std::max(0.0, left.squaredNorm() - freedom);

@@ -33,7 +33,7 @@ struct Mismatch {
 std::string in_words_of_power(double exponent);
 
 /// Runs that are set aside are not asked. Energy: residual power against the white part of the residual itself, estimated from differences, which do not see a smooth mismatch. Colour: Bartlett's test of the
-/// cumulative periodogram. A line: Fisher's test of the largest. A mismatch is found where the p-value, corrected for the number of channels, is below 1e-3 and it is a line's or the residual's power exceeds the noise's
+/// cumulative periodogram. A line, in runs without nonlinear laws, whose steps leave lines of their own: Fisher's test of the largest. A mismatch is found where the p-value, corrected for the number of channels, is below 1e-3 and it is a line's or the residual's power exceeds the noise's
 /// by more than 5 %: a motion that is known to its noise leaves up to that, and no line.
 Mismatch locate_mismatch(const JointProblem& joint);
 
