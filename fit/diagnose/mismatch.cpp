@@ -155,7 +155,7 @@ Mismatch locate_mismatch(const JointProblem& joint) {
     const RunResidual& run = joint.runs()[all[i].run];
     const VectorXd theta = joint.theta(all[i].run);
     std::string text = is_loud ? describe(run, all[i].residual, mismatch) : describe_line(run, all[i].line, mismatch);
-    mismatch.state.push_back(is_linear(run, theta) ? depends_on(run_states(run, run.predict(theta), theta), all[i].residual) : std::nullopt);
+    mismatch.state.push_back(is_loud && is_linear(run, theta) ? depends_on(run_states(run, run.predict(theta), theta), all[i].residual) : std::nullopt);
     if (mismatch.state.back()) text += ", " + sentence(*mismatch.state.back());
     if (const VectorXd& read = run.run().channel(m.channel).value; m.channel == run.channels().front() && read.allFinite()) {
       swing.push_back(std::sqrt((read.array() - read.mean()).square().mean()));

@@ -25,7 +25,7 @@ struct Mismatch {
   std::vector<std::string> runs;                ///< those with a significant mismatch
   std::vector<std::array<double, 2>> time;      ///< s: the shortest stretch of each of them that holds most of the excess
   std::vector<std::array<double, 2>> frequency; ///< Hz: likewise
-  std::vector<std::optional<StateDependence>> state;  ///< on which state of the rig what is left of them depends; none where the model has nonlinear effects
+  std::vector<std::optional<StateDependence>> state;  ///< on which state of the rig what is left of them depends; none where the model has nonlinear effects, or of a line
   std::string summary;
 };
 

@@ -10,6 +10,7 @@
 
 #include "fit/diagnose/diagnose.h"
 #include "fit/fit.h"
+#include "fit/search/effect_search.h"
 
 namespace unrig {
 namespace {
@@ -89,6 +90,22 @@ TEST(MainsHum, IsNoLineElsewhere) {
   const Diagnosis d = diagnose(problem);
   EXPECT_THAT(d.missing, testing::IsEmpty());
   EXPECT_TRUE(d.unexplained);
+}
+
+/// Harmonics that a run is explained as well without are no unknowns that the evidence pays for; what they take of the noise is left of the run.
+TEST(MainsHum, PaysForTheHarmonicsThatThereAre) {
+  FitProblem problem;
+  problem.rig = one_mode();
+  problem.runs = {decay_with_line(50.02, 400, 9)};
+  const Trial base = fit_baseline(problem);
+  Trial hum = prepare(problem, base, {"mains-hum"});
+  fit_fully(hum, 3);
+  constexpr int frequency = 1, one_harmonic = 2;
+  EXPECT_EQ(hum.variables - base.variables, frequency + one_harmonic);
+  const auto samples = static_cast<double>(problem.runs.front().samples());
+  const double taken = samples * hum.variance.front() - hum.arrival.joint.chi2();
+  EXPECT_GT(taken, 0);
+  EXPECT_LT(taken, 4 * std::log(samples)) << "two harmonics, each less than it costs";
 }
 
 }  // namespace

@@ -40,7 +40,7 @@ def diagnose(unrig, folder, seconds):
 def said(d):
     if d is None:
         return "no answer"
-    text = " and ".join(m["effect"] for m in d["missing"]) or ("unexplained" if d["unexplained"] else "nothing")
+    text = " and ".join(f"law: {m['law']['name']}" if m["effect"] == "law" else m["effect"] for m in d["missing"]) or ("unexplained" if d["unexplained"] else "nothing")
     text += "; something remains" if d["missing"] and d["unexplained"] else ""
     text += "; cannot be told from " + ", ".join(" + ".join(other) for other in d["equivalent"]) if d["equivalent"] else ""
     return text + ("; stopped" if d.get("stopped") else "")
