@@ -179,12 +179,18 @@ Eigen::RowVectorXd first_mode(const AeroelasticModel& model, Index coordinates) 
   return shape * Eigen::RowVectorXd::Unit(coordinates, 0);
 }
 
-double first_mode_momentum(const AeroelasticModel& model) {
-  const Rig& rig = model.rig();
-  if (rig.is_modal()) return rig.modal.front().mass * 2 * std::numbers::pi * rig.modal.front().frequency;
-  const double shape = first_mode(model, 1)[0];
-  return model.basis().omega[0] / (shape * shape);
+double first_mode_frequency(const AeroelasticModel& model) {
+  return model.rig().is_modal() ? 2 * std::numbers::pi * model.rig().modal.front().frequency : model.basis().omega[0];
 }
+
+double first_mode_mass(const AeroelasticModel& model) {
+  const Rig& rig = model.rig();
+  if (rig.is_modal()) return rig.modal.front().mass;
+  const double shape = first_mode(model, 1)[0];
+  return 1 / (shape * shape);  // modes of unit generalised mass
+}
+
+double first_mode_momentum(const AeroelasticModel& model) { return first_mode_mass(model) * first_mode_frequency(model); }
 
 DualMatrix port(const LinearSystem& system, Index column, double amount) {
   MatrixXd direction = MatrixXd::Zero(system.B.cols(), 1);

@@ -1,5 +1,4 @@
 #include <cmath>
-#include <numbers>
 
 #include "core/effects/list.h"
 
@@ -23,11 +22,6 @@ double rate_of_memory(const double* argument, const double* p, double* slope, do
 
 constexpr const char* sizes = "Record free decays that begin below and far above the yield displacement.";
 
-/// Angular frequency of the first normal mode [rad/s], dry.
-double first_frequency(const AeroelasticModel& model) {
-  return model.rig().is_modal() ? 2 * std::numbers::pi * model.rig().modal.front().frequency : model.basis().omega[0];
-}
-
 }  // namespace
 
 /// Hysteresis of the rig in its fundamental mode: F = -F_y z on the coordinate of the first normal mode, scaled to the element that the dead weights hung at,
@@ -46,11 +40,11 @@ Effect bouc_wen() {
   e.parameters = {{"force", "N", 0, 0, 1e6, false, sizes}, {"yield_displacement", "m", 1e-3, 1e-9, 1, false, sizes}, {"shape", "1", 0.5, -1, 1, false, sizes}, {"sharpness", "1", 1, 0.5, 4, false, sizes}};
   e.starts = {Eigen::Vector4d(0.1, 1e-3, 0.5, 1)};
   e.starts_for = [](const AeroelasticModel& model, double fastest) -> std::vector<Eigen::VectorXd> {  // a tenth of the elastic force, yielding at a tenth and a half of the motion
-    const double force = 0.1 * first_mode_momentum(model) * fastest, widest = fastest / first_frequency(model);
+    const double force = 0.1 * first_mode_momentum(model) * fastest, widest = fastest / first_mode_frequency(model);
     return {Eigen::Vector4d(force, 0.1 * widest, 0.5, 1), Eigen::Vector4d(force, 0.5 * widest, 0.5, 1)};
   };
   e.draw = [](const AeroelasticModel& model, double release, Effect::Random& random) -> Eigen::VectorXd {  // beside the load and the deflection that release the pluck
-    const double deflection = release / (first_mode_momentum(model) * first_frequency(model));
+    const double deflection = release / (first_mode_momentum(model) * first_mode_frequency(model));
     const Eigen::VectorXd p = log_between(random, {{0.003, 0.3}, {0.03, 0.5}, {0.1, 0.9}});
     return Eigen::Vector4d(p[0] * release, p[1] * deflection, p[2], 1);
   };

@@ -147,7 +147,10 @@ Eigen::RowVectorXd rate_of(const LinearSystem& system, const Eigen::RowVectorXd&
 
 /// The first normal mode as a row over the coordinates: what it displaces the element by that the dead weights hung at. Modal rigs: the first mode's coordinate itself.
 Eigen::RowVectorXd first_mode(const AeroelasticModel& model, Eigen::Index coordinates);
-/// Mass that moves there, times the mode's angular frequency [kg/s].
+/// Angular frequency of that mode [rad/s], dry.
+double first_mode_frequency(const AeroelasticModel& model);
+/// Mass that moves there [kg], and the same times the mode's angular frequency [kg/s].
+double first_mode_mass(const AeroelasticModel& model);
 double first_mode_momentum(const AeroelasticModel& model);
 
 /// As append_signal, for a signal that is simply added to output `row`.

@@ -1,6 +1,3 @@
-#include <cmath>
-#include <numbers>
-
 #include "core/effects/list.h"
 
 namespace unrig {
@@ -24,12 +21,6 @@ double inertia(const double* argument, const double* p, double* slope, double* p
 
 constexpr const char* longer = "Record a longer decay in the liquid, released as it is lowered in.";
 
-/// Mass that moves in the first normal mode, at the calibration element [kg].
-double moving_mass(const AeroelasticModel& model) {
-  const double omega = model.rig().is_modal() ? 2 * std::numbers::pi * model.rig().modal.front().frequency : model.basis().omega[0];
-  return first_mode_momentum(model) / omega;
-}
-
 }  // namespace
 
 /// Mass that changes with time, as of a hollow section that fills: F = -m (1 - exp(-t/tau)) a on the coordinate of the first normal mode, scaled to the element that the dead weights hung at;
@@ -47,11 +38,11 @@ Effect filling_mass() {
   e.parameters = {{"mass", "kg", 0, -1e6, 1e6, false, longer}, {"time", "s", 1, 0.02, 1e3, false, longer}};
   for (const double tau : {0.5, 3.0}) e.starts.push_back(Eigen::Vector2d(0.05, tau));
   e.starts_for = [](const AeroelasticModel& model, double) -> std::vector<Eigen::VectorXd> {  // some per cent of what moves
-    return {Eigen::Vector2d(0.03 * moving_mass(model), 0.5), Eigen::Vector2d(0.03 * moving_mass(model), 3)};
+    return {Eigen::Vector2d(0.03 * first_mode_mass(model), 0.5), Eigen::Vector2d(0.03 * first_mode_mass(model), 3)};
   };
   e.draw = [](const AeroelasticModel& model, double, Effect::Random& random) -> Eigen::VectorXd {
     const Eigen::VectorXd p = log_between(random, {{0.003, 0.1}, {0.3, 8}});
-    return Eigen::Vector2d(p[0] * moving_mass(model), p[1]);
+    return Eigen::Vector2d(p[0] * first_mode_mass(model), p[1]);
   };
   e.states = [](const AeroelasticModel&, const Conditions&) -> Eigen::Index { return 1; };
   e.acts_in = "a run in a fluid of more than 100 kg/m^3";

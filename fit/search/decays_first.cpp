@@ -24,6 +24,18 @@ constexpr double followed = 1.2;  // chi-square over the degrees of freedom of d
 
 bool is_decay(const RunResidual& run) { return run.motion().unknowns() == 0; }
 
+bool acts_in_decays(const JointProblem& joint, const std::string& id) {
+  const Rig& rig = joint.model().rig();
+  return std::any_of(joint.runs().begin(), joint.runs().end(), [&](const RunResidual& run) { return is_decay(run) && effect(rig, id).acts(rig, run.conditions()); });
+}
+
+/// Whether any law does.
+bool follow_laws(const JointProblem& joint) {
+  return std::any_of(joint.runs().begin(), joint.runs().end(), [](const RunResidual& run) {
+    return is_decay(run) && !run.model().system(run.conditions(), run.model().start_values(), run.channels()).feedback.empty();
+  });
+}
+
 /// theta and the decays' trajectories, with laws that are trusted more and more (fit/search/law_smoother.h).
 class GrowingTrust {
  public:
@@ -355,22 +367,6 @@ double left_as_trusted(const JointProblem& joint) {
   trust.fit(GrowingTrust::trusted_levels);
   return trust.left_as_trusted();
 }
-
-namespace {
-
-bool acts_in_decays(const JointProblem& joint, const std::string& id) {
-  const Rig& rig = joint.model().rig();
-  return std::any_of(joint.runs().begin(), joint.runs().end(), [&](const RunResidual& run) { return is_decay(run) && effect(rig, id).acts(rig, run.conditions()); });
-}
-
-/// Whether any law does.
-bool follow_laws(const JointProblem& joint) {
-  return std::any_of(joint.runs().begin(), joint.runs().end(), [](const RunResidual& run) {
-    return is_decay(run) && !run.model().system(run.conditions(), run.model().start_values(), run.channels()).feedback.empty();
-  });
-}
-
-}  // namespace
 
 DecaysLeft fit_decays(JointProblem& joint, const std::string& id, bool from_here) {
   JointProblem start = joint;

@@ -76,7 +76,7 @@ void count_unknowns(const RunResidual& run, const VectorXd& theta, const RunResi
     const VectorXd told = swing * Eigen::JacobiSVD<MatrixXd>(known_of(p, filters).triangle).singularValues();
     left.unknowns -= static_cast<Index>(filters.size()) - (told.array() > 1).count();
   }
-  for (const std::vector<Index>& part : system.parts) {
+  for (const std::vector<Index>& part : system.parts) {  // each by itself: at frequencies apart they are all but orthogonal
     const std::vector<Index> places = places_of(run, part);
     const Known known = known_of(p, places);
     const double takes = (run.tempered() * (known.triangle * known.estimate)).squaredNorm(), costs = static_cast<double>(places.size()) * log_samples;

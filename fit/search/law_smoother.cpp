@@ -120,7 +120,7 @@ void LawSmoother::answer_at(Index k, const VectorXd& theta) {
   constexpr int most = 20;
   constexpr double arrived = 1e-12;
   const Index arguments = arguments_.count(), given = system_.B.cols() - laws_;
-  const MatrixXd of_forces = arguments_.sees_input.value.rightCols(laws_);
+  const auto of_forces = arguments_.sees_input.value.rightCols(laws_);
   VectorXd known = arguments_.sees.value * state_.col(k);
   if (given > 0) known += arguments_.sees_input.value.leftCols(given) * inputs_.row(k).transpose();
   auto force = force_.col(k);

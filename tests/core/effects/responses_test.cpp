@@ -5,10 +5,8 @@
 #include <cmath>
 #include <random>
 
-#include "core/effects/effect.h"
 #include "core/propagate/nonlinear_response.h"
-#include "core/rig/structure.h"
-#include "tests/support/sample_data.h"
+#include "tests/core/effects/effect_cases.h"
 
 namespace unrig {
 namespace {
@@ -23,24 +21,14 @@ constexpr Index samples = 60;
 /// A rig in a stream that records a force and the motion of its mount.
 class ResponseOfARig {
  public:
-  ResponseOfARig(const Rig& rig, const Effect& e)
-      : model_(AeroelasticModel(rig, rig.is_modal() ? Basis{} : make_basis(rig, Index{3}, Index{1}), wagner(Wagner::jones)).with_effects({e.id})) {
-    conditions_.density = 998.2;
-    conditions_.force = conditions_.mount = true;
-    conditions_.nyquist = 250;
-    if (!rig.is_modal()) {
-      conditions_.speed = 0.6;
-      conditions_.prescribed_pitch = true;
-      conditions_.onset_angle = 0.44;
-    }
+  ResponseOfARig(const Rig& rig, const Effect& e) : model_(effect_cases::model_with(rig, e.id)), conditions_(effect_cases::conditions_for(rig)) {
     std::mt19937_64 random(11);
     theta_ = model_.start_values();
     if (e.draw && !rig.is_modal()) theta_.tail(static_cast<Index>(e.parameters.size())) = e.draw(model_, 20, random);
     for (double& p : theta_)
       if (p == 0) p = 1e-3;
     system_ = system(theta_);
-    start_ = VectorXd::Zero(system_.states());
-    start_.setConstant(0.3);  // memories too: at rest a law may have a corner
+    start_ = VectorXd::Constant(system_.states(), 0.3);  // memories too: at rest a law may have a corner
     start_.head(system_.free_states()).setConstant(0.003);
     start_.head(system_.coordinates).setConstant(5e-5);
     start_.segment(system_.coordinates, system_.coordinates).setConstant(5e-3);
@@ -71,21 +59,9 @@ class ResponseOfARig {
   LinearSystem system_;
 };
 
-Rig two_modes() {
-  Rig rig;
-  rig.file = "modes.toml";
-  rig.modal = {{2, 3, 0.01, 1000, "N"}, {0.5, 11, 0.02, 700, "N"}};
-  return rig;
-}
-
-std::vector<std::pair<const Effect*, Rig>> nonlinear_effects() {
-  Rig beam = read_rig(test::null_campaign("rig.toml"));
-  beam.sensors.push_back({"twist", SensorKind::twist, 14, 1, "rad"});
-  std::vector<std::pair<const Effect*, Rig>> all;
-  for (const Rig& rig : {beam, two_modes()})
-    for (const Effect& e : effects())
-      if (has(rig, e.needs))
-        if (const ResponseOfARig one(rig, e); !one.system().feedback.empty()) all.emplace_back(&e, rig);
+std::vector<effect_cases::Case> nonlinear_effects() {
+  std::vector<effect_cases::Case> all = effect_cases::cases();
+  std::erase_if(all, [](const effect_cases::Case& c) { return ResponseOfARig(c.rig, *c.effect).system().feedback.empty(); });
   return all;
 }
 
