@@ -40,11 +40,13 @@ TEST(DisturbanceRoot, OfAFlatDensityIsWhiteNoise) {
   const Corrected c;
   const double part = 0.3, white = 2 * c.recorded.run.dt * std::pow(c.residual.sigma(0), 2);
   const MatrixXd found = c.covariance([&](const std::string& channel, double) { return channel == "gauge" ? part * white : 0; });
-  const MatrixXd slope = c.sensitivity.channels[0].slope, C = c.root * c.root.transpose(), wanted = part * C * (slope.transpose() * slope) * C;
+  // With C = R R' from the inside out: J R is of order one, while C (J' J) C loses five digits more to cancellation.
+  const MatrixXd by_reading = c.sensitivity.channels[0].slope * c.root;
+  const MatrixXd wanted = part * c.root * (by_reading.transpose() * by_reading) * c.root.transpose();
   const Index thetas = c.theta.size();
   EXPECT_LT((found.topLeftCorner(thetas, thetas) - wanted).norm(), 1e-9 * wanted.norm());
   const Index offset = thetas + c.residual.first_offset();
-  const VectorXd into = c.sensitivity.channels[0].into_offset + slope * (C * c.e.linear_slope.row(c.residual.first_offset()).transpose());
+  const VectorXd into = c.sensitivity.channels[0].into_offset + by_reading * (c.root.transpose() * c.e.linear_slope.row(c.residual.first_offset()).transpose());
   EXPECT_NEAR(found(offset, offset), part * into.squaredNorm(), 1e-9 * found(offset, offset));
 }
 
