@@ -3,9 +3,12 @@
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
+#include <optional>
 
-#include "core/propagate/feedback_force.h"
 #include "core/numerics/small_product.h"
+#include "core/propagate/block_of_steps.h"
+#include "core/propagate/feedback_force.h"
+#include "core/propagate/step_matrices.h"
 
 namespace unrig {
 namespace {
@@ -97,75 +100,6 @@ Few<M> implicit_argument(Laws<M>& laws, const Few<M>& known, const FewSquare<M>&
   return z;
 }
 
-/// All that one sample step does linearly, as one matrix from v = [x; f; jerk; u now; u next] to [x without the force at the end of the step; what the laws see
-/// of that; outputs now]. The rows are padded for small_product.
-struct StepMatrices {
-  Index states, feedbacks, arguments, channels, measured, parameters;
-  MatrixXd step;     // rows x inputs
-  MatrixXd late;     // rows x feedbacks: what the force at the end of the step adds
-  MatrixXd partial;  // (rows P) x inputs, parameter by parameter
-  MatrixXd late_partial;
-
-  Index rows() const { return step.rows(); }
-  Index inputs() const { return step.cols(); }
-  Index force() const { return states; }
-  Index jerk() const { return states + feedbacks; }
-  Index input() const { return jerk() + 1; }
-  Index argument() const { return states; }
-  Index output() const { return states + arguments; }
-
-  StepMatrices(const LinearSystem& system, const ExactStep& exact, const Arguments& seen, Index parameter_count)
-      : states(system.states()), feedbacks(static_cast<Index>(system.feedback.size())), arguments(seen.count()), channels(system.C.rows()), measured(system.B.cols() - feedbacks), parameters(parameter_count) {
-    const auto value = [](const DualMatrix& m) { return &m.value; };
-    fill(system, exact, seen.sees.value, value, step, late);
-    see(seen.sees_input.value, step, late);
-    partial.resize(parameters * rows(), inputs());
-    late_partial.resize(parameters * rows(), feedbacks);
-    MatrixXd d_step, d_late;
-    for (Index j = 0; j < parameters; ++j) {
-      fill(system, exact, seen.sees.value, [j](const DualMatrix& m) { return m.depends_on(j) ? &m.d(j) : nullptr; }, d_step, d_late);
-      if (seen.sees.depends_on(j)) {
-        d_step.middleRows(argument(), arguments) += seen.sees.d(j) * step.topRows(states);
-        d_late.middleRows(argument(), arguments) += seen.sees.d(j) * late.topRows(states);
-      }
-      if (seen.sees_input.depends_on(j)) see(seen.sees_input.d(j), d_step, d_late);
-      partial.middleRows(j * rows(), rows()) = d_step;
-      late_partial.middleRows(j * rows(), rows()) = d_late;
-    }
-  }
-
- private:
-  /// What the laws see of inputs and forces at the end of the step.
-  void see(const MatrixXd& sees_input, MatrixXd& all, MatrixXd& at_end) const {
-    all.block(argument(), input() + measured, arguments, measured) += sees_input.leftCols(measured);
-    at_end.middleRows(argument(), arguments) += sees_input.rightCols(feedbacks);
-  }
-
-  template <typename Part>
-  void fill(const LinearSystem& system, const ExactStep& exact, const MatrixXd& sees, Part part, MatrixXd& all, MatrixXd& at_end) const {
-    all = MatrixXd::Zero(padded_rows(states + arguments + channels), states + feedbacks + 1 + 2 * measured);
-    at_end = MatrixXd::Zero(all.rows(), feedbacks);
-    if (const MatrixXd* m = part(exact.transition)) all.topLeftCorner(states, states) = *m;
-    if (const MatrixXd* m = part(exact.input0)) {
-      all.block(0, force(), states, feedbacks) = m->rightCols(feedbacks);
-      all.block(0, input(), states, measured) = m->leftCols(measured);
-    }
-    if (const MatrixXd* m = part(exact.input1)) {
-      at_end.topRows(states) = m->rightCols(feedbacks);
-      all.block(0, input() + measured, states, measured) = m->leftCols(measured);
-    }
-    if (exact.jerk.value.size() > 0)
-      if (const MatrixXd* m = part(exact.jerk)) all.col(jerk()).head(states) = m->col(0);
-    all.middleRows(argument(), arguments) = sees * all.topRows(states);
-    at_end.middleRows(argument(), arguments) = sees * at_end.topRows(states);
-    if (const MatrixXd* m = part(system.C)) all.block(output(), 0, channels, states) = *m;
-    if (const MatrixXd* m = part(system.D)) {
-      all.block(output(), force(), channels, feedbacks) = m->rightCols(feedbacks);
-      all.block(output(), input(), channels, measured) = m->leftCols(measured);
-    }
-  }
-};
-
 Index steps_per_sample(const LinearSystem& system) {
   Index most = 1;
   for (const Feedback& f : system.feedback) most = std::max(most, f.steps_per_sample);
@@ -184,7 +118,6 @@ class Follower {
         laws_(system, arguments_, theta),
         one_(system, exact, arguments_, partials == Partials::all ? system.A.parameters() : 0),
         directions_(drive.start_tangent.cols()),
-        columns_(directions_ + one_.parameters),
         gain_(one_.late.middleRows(one_.argument(), one_.arguments)),
         by_argument_(gain_(Eigen::all, arguments_.owner)) {}
 
@@ -193,13 +126,15 @@ class Follower {
     for (Index first = 0; first < steps_ && response_.finite; first += most_at_a_time) {
       const Index count = std::min(most_at_a_time, steps_ - first);
       march(first, count);
-      if (columns_ > 0 && response_.finite) carry_tangents(first, count);
+      if (directions_ > 0 && response_.finite) carry_directions(first, count);
+      if (one_.parameters > 0 && response_.finite) carry_parameters(first, count);
       now_.col(0) = now_.col(count);
       slope_.col(0) = slope_.col(count);
     }
     response_.largest_argument = largest_;
     response_.end = now_.col(0).head(one_.states);
-    response_.end_tangent = tangent_.topRows(one_.states);
+    response_.end_tangent.resize(one_.states, directions_ + one_.parameters);
+    response_.end_tangent << work_.changes.topLeftCorner(directions_, one_.states).transpose(), tangent_.topRows(one_.states);
     return std::move(response_);
   }
 
@@ -209,7 +144,8 @@ class Follower {
   void begin() {
     const Index n = one_.states, m = one_.feedbacks, block = std::min(most_at_a_time, steps_);
     response_.output.resize(samples_, one_.channels);
-    response_.tangent.assign(static_cast<std::size_t>(columns_ > 0 ? one_.channels : 0), MatrixXd(samples_, columns_));
+    const Index columns = directions_ + one_.parameters;
+    response_.tangent.assign(static_cast<std::size_t>(columns > 0 ? one_.channels : 0), MatrixXd(samples_, columns));
     now_ = MatrixXd::Zero(one_.inputs(), block + 1);
     slope_ = MatrixXd::Zero(one_.arguments, block + 1);
     stepped_ = VectorXd::Zero(one_.rows());
@@ -220,9 +156,6 @@ class Follower {
     law_partial_ = MatrixXd::Zero(m, one_.parameters * (block + 1));
     if (one_.parameters > 0) laws_.partials_at(z_, law_partials(0));
     largest_ = VectorXd::Zero(m);
-    tangent_ = next_ = MatrixXd::Zero(std::max(one_.rows(), one_.input()), columns_);  // the jerk is that of the sample
-    if (directions_ > 0) tangent_.topLeftCorner(n, directions_) = drive_.start_tangent;
-    if (one_.parameters > 0 && drive_.start_partial.size() > 0) tangent_.topRightCorner(n, one_.parameters) = drive_.start_partial;
     start_tangents();
   }
 
@@ -236,15 +169,30 @@ class Follower {
     if (arguments_.accelerations) z_ = implicit_argument<M>(laws_, known, of_forces, of_forces(Eigen::all, arguments_.owner), z_);
   }
 
-  /// Of those forces: df = slope dz + partial, dz = sees dx + dsees x + the same of inputs and forces.
   void start_tangents() {
     const Index n = one_.states, m = one_.feedbacks, P = one_.parameters;
-    MatrixXd seen = arguments_.sees.value * tangent_.topRows(n), force = MatrixXd::Zero(m, columns_);
-    force.rightCols(P) = law_partials(0);
-    if (!arguments_.accelerations) {
-      tangent_.middleRows(one_.force(), m) = by_feedback(slope_.col(0).asDiagonal() * seen) + force;
-      return;
-    }
+    MatrixXd start = MatrixXd::Zero(n, directions_ + P);
+    if (directions_ > 0) start.leftCols(directions_) = drive_.start_tangent;
+    if (P > 0 && drive_.start_partial.size() > 0) start.rightCols(P) = drive_.start_partial;
+    const MatrixXd force = force_tangents(start);
+    tangent_.resize(n + m, P);
+    tangent_ << start.rightCols(P), force.rightCols(P);
+    next_.resize(one_.rows(), P);
+    work_.changes.resize(0, n);
+    if (directions_ == 0) return;
+    const bool jerks = drive_.jerk_tangent.size() > 0;
+    block_.emplace(one_, BlockOfSteps::best_length(one_), jerks);
+    work_ = block_->work(directions_);
+    work_.changes.topLeftCorner(directions_, n + m) << start.leftCols(directions_).transpose(), force.leftCols(directions_).transpose();
+  }
+
+  /// Of the forces where the stretch begins: df = slope dz + partial, dz = sees dx + dsees x + the same of inputs and forces.
+  MatrixXd force_tangents(const MatrixXd& state) {
+    const Index m = one_.feedbacks, P = one_.parameters;
+    MatrixXd seen = arguments_.sees.value * state, partial = MatrixXd::Zero(m, state.cols());
+    partial.rightCols(P) = law_partials(0);
+    const auto own = of_each<MatrixXd>(slope_.col(0));
+    if (!arguments_.accelerations) return own * seen + partial;
     VectorXd inputs(one_.measured + m);
     if (one_.measured > 0) inputs.head(one_.measured) = drive_.input.row(0).transpose();
     inputs.tail(m) = laws_.force;
@@ -252,9 +200,8 @@ class Follower {
       if (arguments_.sees.depends_on(j)) seen.col(directions_ + j) += arguments_.sees.d(j) * drive_.start;
       if (arguments_.sees_input.depends_on(j)) seen.col(directions_ + j) += arguments_.sees_input.d(j) * inputs;
     }
-    const MatrixXd of_forces = arguments_.sees_input.value.rightCols(m);
-    const MatrixXd answer = MatrixXd::Identity(m, m) - by_feedback(slope_.col(0).asDiagonal() * of_forces);
-    tangent_.middleRows(one_.force(), m) = answer.partialPivLu().solve(by_feedback(slope_.col(0).asDiagonal() * seen) + force);
+    const MatrixXd answer = MatrixXd::Identity(m, m) - own * arguments_.sees_input.value.rightCols(m);
+    return answer.partialPivLu().solve(own * seen + partial);
   }
 
   auto law_partials(Index k) { return law_partial_.middleCols(k * one_.parameters, one_.parameters); }
@@ -290,103 +237,76 @@ class Follower {
     }
   }
 
-  /// The tangents over the same samples: dx' = step dv + dstep v + late df + dlate f, df = slope dz + partial, where dz is solved for.
-  void carry_tangents(Index first, Index count) {
-    const Index m = one_.feedbacks, p = one_.parameters, rows = one_.rows();
-    if (p > 0) {
-      source_.noalias() = one_.partial * now_.leftCols(count);
-      source_.noalias() += one_.late_partial * now_.block(one_.force(), 1, m, count);
+  /// The tangents along the directions over the same steps: df = slope dz, where dz is solved for.
+  void carry_directions(Index first, Index count) {
+    for (Index done = 0; done < count;) {
+      const BlockOfSteps& block = count - done >= block_->steps() ? *block_ : last_block(count - done);
+      block.begin(work_);
+      for (Index k = 0; k < block.steps(); ++k) {
+        if (drive_.jerk_tangent.size() > 0) block.jerk(work_, k).head(directions_) = drive_.jerk_tangent.row((first + done + k) / per_sample_);
+        block.add_changes(work_, k);
+        block.forces(work_, k) = work_.seen.middleCols(k * block.per_step(), one_.arguments).lazyProduct(answer_to(slope_.col(done + k + 1)).transpose());
+      }
+      read_directions(block, first + done);
+      block.end(work_);
+      done += block.steps();
     }
-    Index ahead = 0;  // steps over which the directions have been carried already
+  }
+
+  /// What is left of the steps at their end.
+  const BlockOfSteps& last_block(Index steps) {
+    if (!last_block_ || last_block_->steps() != steps) last_block_.emplace(one_, steps, drive_.jerk_tangent.size() > 0);
+    return *last_block_;
+  }
+
+  /// The channels of a block whose first step is `first`, at the steps that begin a sample.
+  void read_directions(const BlockOfSteps& block, Index first) {
+    const Index sample = (first + per_sample_ - 1) / per_sample_, skipped = sample * per_sample_ - first;
+    if (skipped >= block.steps()) return;
+    const Index reads = (block.steps() - skipped - 1) / per_sample_ + 1, rows = work_.seen.rows();
+    for (Index c = 0; c < one_.channels; ++c) {
+      const Eigen::Map<const MatrixXd, 0, Eigen::OuterStride<>> seen(work_.seen.col(skipped * block.per_step() + one_.arguments + c).data(), directions_, reads, Eigen::OuterStride<>(per_sample_ * block.per_step() * rows));
+      response_.tangent[static_cast<std::size_t>(c)].block(sample, 0, reads, directions_) = seen.transpose();
+    }
+  }
+
+  /// The tangents in the parameters over the same steps: dx' = step dv + dstep v + late df + dlate f, df = slope dz + partial, where dz is solved for.
+  void carry_parameters(Index first, Index count) {
+    const Index n = one_.states, m = one_.feedbacks, p = one_.parameters, rows = one_.rows();
+    source_.noalias() = one_.partial * now_.leftCols(count);
+    source_.noalias() += one_.late_partial * now_.block(one_.force(), 1, m, count);
     for (Index k = 0; k < count; ++k) {
-      const Index sample = (first + k) / per_sample_;
-      const bool reads = (first + k) % per_sample_ == 0;
-      if (reads && drive_.jerk_tangent.size() > 0) directions_jerk() = drive_.jerk_tangent.row(sample);
-      if (reads && directions_ > 0 && k + per_sample_ <= count && straight_over(k)) {
-        const MatrixXd& over_sample = straight_step(slope_.col(k));
-        small_product(over_sample.data(), rows, one_.input(), tangent_.data(), tangent_.rows(), directions_, next_.data(), next_.rows());
-        read(sample, 0, directions_);
-        tangent_.topLeftCorner(one_.jerk(), directions_) = next_.topLeftCorner(one_.jerk(), directions_);
-        ahead = per_sample_;
+      small_product(one_.step.data(), rows, one_.jerk(), tangent_.data(), tangent_.rows(), p, next_.data(), next_.rows());
+      for (Index j = 0; j < p; ++j) next_.col(j) += source_.col(k).segment(j * rows, rows);
+      if ((first + k) % per_sample_ == 0)
+        for (Index c = 0; c < one_.channels; ++c) response_.tangent[static_cast<std::size_t>(c)].row((first + k) / per_sample_).tail(p) = next_.row(one_.output() + c);
+      next_ += one_.late.lazyProduct(law_partials(k + 1));
+      const FewSquare<M> answer = answer_to(slope_.col(k + 1));
+      for (Index j = 0; j < p; ++j) {
+        const Few<M> force = answer.lazyProduct(next_.col(j).segment(one_.argument(), one_.arguments));
+        for (Index i = 0; i < m; ++i) next_.col(j).head(n) += force[i] * one_.late.col(i).head(n);
+        tangent_.col(j).head(n) = next_.col(j).head(n);
+        tangent_.col(j).tail(m) = force + law_partials(k + 1).col(j);
       }
-      const Index from = ahead > 0 ? directions_ : 0;  // first column to be carried step by step
-      if (from < columns_) {
-        small_product(one_.step.data(), rows, one_.input(), tangent_.col(from).data(), tangent_.rows(), columns_ - from, next_.col(from).data(), next_.rows());
-        auto by_parameter = next_.rightCols(p);
-        for (Index j = 0; j < p; ++j) by_parameter.col(j).head(rows) += source_.col(k).segment(j * rows, rows);
-        if (reads) read(sample, from, columns_);
-        if (p > 0) by_parameter.topRows(rows) += one_.late.lazyProduct(law_partials(k + 1));
-        feed_back(slope_.col(k + 1), from);
-        if (p > 0) by_parameter.middleRows(one_.force(), m) += law_partials(k + 1);
-        tangent_.block(0, from, one_.jerk(), columns_ - from) = next_.block(0, from, one_.jerk(), columns_ - from);
-      }
-      if (ahead > 0) --ahead;
     }
   }
 
-  auto directions_jerk() { return tangent_.row(one_.jerk()).head(directions_); }
-
-  void read(Index sample, Index from, Index to) {
-    for (Index c = 0; c < one_.channels; ++c) response_.tangent[static_cast<std::size_t>(c)].row(sample).segment(from, to - from) = next_.row(one_.output() + c).segment(from, to - from);
-  }
-
-  /// Whether the laws have one slope each all over the sample that begins with step k.
-  bool straight_over(Index k) const { return per_sample_ > 1 && (slope_.middleCols(k + 1, per_sample_).colwise() - slope_.col(k)).isZero(0); }
-
-  /// What the steps of a sample do to [x; df; djerk] while the laws have these slopes, and what is read at its beginning: a law of straight pieces (a gap) has few.
-  const MatrixXd& straight_step(const Few<M>& slope) {
-    for (const StraightStep& known : straight_)
-      if (known.slope == slope) return known.over_sample;
-    constexpr std::size_t most = 8;
-    if (straight_.size() == most) straight_.erase(straight_.begin());
-    const Index n = one_.states, m = one_.feedbacks, size = one_.input();
-    MatrixXd step = MatrixXd::Identity(size, size);
-    step.middleRows(n, m) = by_feedback(answer_of(slope) * one_.step.block(one_.argument(), 0, one_.arguments, size));
-    step.topRows(n) = one_.step.topLeftCorner(n, size) + one_.late.topRows(n) * step.middleRows(n, m);
-    const MatrixXd all = power(step, per_sample_);
-    MatrixXd over_sample = MatrixXd::Zero(one_.rows(), size);
-    over_sample.topRows(n + m) = all.topRows(n + m);
-    over_sample.middleRows(one_.output(), one_.channels) = one_.step.block(one_.output(), 0, one_.channels, size);
-    straight_.push_back({slope, std::move(over_sample)});
-    return straight_.back().over_sample;
-  }
-
-  /// Puts the change of the force where that of its argument stands, and adds what it does to the state, in columns `from` on.
-  void feed_back(const Few<M>& slope, Index from) {
-    const Index n = one_.states, m = one_.feedbacks;
-    const FewSquare<M> answer = answer_of(slope);
-    for (Index j = from; j < columns_; ++j) {
-      const Few<M> by_argument = answer.lazyProduct(next_.col(j).segment(one_.argument(), one_.arguments));
-      const Few<M> force = of_feedbacks(by_argument);
-      for (Index i = 0; i < m; ++i) next_.col(j).head(n) += force[i] * one_.late.col(i).head(n);
-      next_.col(j).segment(one_.force(), m) = force;
+  /// How the forces at the end of a step, feedbacks x arguments, answer to what the laws see there without them: df = slope (dz + gain df).
+  FewSquare<M> answer_to(const Few<M>& slope) const {
+    if constexpr (M == one) {
+      return slope / (1 - slope[0] * gain_(0, 0));
+    } else {
+      const auto own = of_each<FewSquare<M>>(slope);
+      return (FewSquare<M>::Identity(own.rows(), own.rows()) - own.lazyProduct(gain_)).partialPivLu().solve(own);
     }
   }
 
-  /// How the force at the end of a step answers, by way of each argument, to what the laws see there without it.
-  FewSquare<M> answer_of(const Few<M>& slope) const {
-    const Index m = one_.arguments;
-    return slope.asDiagonal() * inverse(FewSquare<M>::Identity(m, m) - by_argument_ * slope.asDiagonal());
-  }
-
-  /// Of each feedback the sum over its arguments.
-  Few<M> of_feedbacks(const Few<M>& by_argument) const {
-    if constexpr (M == one) return by_argument;
-    Few<M> sum = Few<M>::Zero(one_.feedbacks);
-    for (Index a = 0; a < by_argument.size(); ++a) sum[arguments_.owner[static_cast<std::size_t>(a)]] += by_argument[a];
-    return sum;
-  }
-  MatrixXd by_feedback(const MatrixXd& by_argument) const {
-    MatrixXd sum = MatrixXd::Zero(one_.feedbacks, by_argument.cols());
-    for (Index a = 0; a < by_argument.rows(); ++a) sum.row(arguments_.owner[static_cast<std::size_t>(a)]) += by_argument.row(a);
-    return sum;
-  }
-
-  static FewSquare<M> inverse(const FewSquare<M>& matrix) {
-    if constexpr (M == one)
-      return matrix.cwiseInverse();
-    else
-      return matrix.partialPivLu().inverse();
+  /// The slopes as feedbacks x arguments.
+  template <typename Matrix>
+  Matrix of_each(const Few<M>& slope) const {
+    Matrix own = Matrix::Zero(one_.feedbacks, one_.arguments);
+    for (Index a = 0; a < slope.size(); ++a) own(arguments_.owner[static_cast<std::size_t>(a)], a) = slope[a];
+    return own;
   }
 
   const NonlinearDrive& drive_;
@@ -394,17 +314,15 @@ class Follower {
   Arguments arguments_;
   Laws<M> laws_;
   StepMatrices one_;
-  Index directions_, columns_;
+  Index directions_;
   FewSquare<M> gain_;         // arguments x feedbacks: how the force at the end of a step moves what the laws see there
   FewSquare<M> by_argument_;  // the same for each argument's feedback
   NonlinearResponse response_;
-  MatrixXd now_, slope_, law_partial_, source_, tangent_, next_;
+  MatrixXd now_, slope_, law_partial_, source_;
+  MatrixXd tangent_, next_;  // of [x; f] in the parameters, and the rows of a step
+  std::optional<BlockOfSteps> block_, last_block_;
+  BlockOfSteps::Work work_;
   VectorXd stepped_, largest_;
-  struct StraightStep {
-    Few<M> slope;
-    MatrixXd over_sample;  // rows x [x; f; jerk]
-  };
-  std::vector<StraightStep> straight_;
   Few<M> z_;
 };
 

@@ -65,7 +65,6 @@ TEST(NonlinearResponse, AGapKeepsEnergyAndPeriod) {
 }
 
 TEST(NonlinearResponse, TangentsOfALawOfStraightPiecesAreThoseOfItsResponse) {
-  // Where the twist stays within the gap, or beyond it, all over a sample, the tangents take one step for the eight of the response.
   const Rig rig = read_rig(test::null_campaign("rig.toml"));
   const AeroelasticModel model = AeroelasticModel(rig, make_basis(rig, Index{2}, Index{1}), wagner(Wagner::jones)).with_effects({"freeplay"});
   Conditions conditions;
