@@ -62,37 +62,38 @@ class Laws {
   const VectorXd& theta_;
 };
 
+/// z with z = known + gain f(z): Newton's method with the inverse of an earlier step as long as that takes the residual down, halved where it does not fall. `by_argument`: the
+/// column of `gain` for each argument's feedback. `inverse`: of 1 - by_argument slope.
 template <int M>
-Few<M> solve_few(const FewSquare<M>& matrix, const Few<M>& right) {
-  if constexpr (M == one)
-    return right / matrix(0, 0);
-  else
-    return matrix.partialPivLu().solve(right);
-}
-
-/// z with z = known + gain f(z): Newton's method, halved where the residual does not fall. `by_argument`: the column of `gain` for each argument's feedback.
-template <int M>
-Few<M> implicit_argument(Laws<M>& laws, const Few<M>& known, const FewSquare<M>& gain, const FewSquare<M>& by_argument, Few<M> z) {
+Few<M> implicit_argument(Laws<M>& laws, const Few<M>& known, const FewSquare<M>& gain, const FewSquare<M>& by_argument, Few<M> z, FewSquare<M>& inverse) {
   constexpr int most = 60;
+  constexpr double quickly = 0.1;
   const Index m = z.size();
   const auto residual_of = [&](const Few<M>& at) -> Few<M> {
     laws.at(at);
-    return at - known - gain * laws.force;
+    return at - known - gain.lazyProduct(laws.force);
   };
   Few<M> residual = residual_of(z);
   for (int i = 0; i < most; ++i) {
     const double size = residual.norm(), scale = 1e-13 * (known.norm() + z.norm()) + 1e-300;
     if (!(size > scale)) return z;
-    const Few<M> step = solve_few<M>(FewSquare<M>::Identity(m, m) - by_argument * laws.slope.asDiagonal(), residual);
-    double fraction = 1;
-    Few<M> next = z - step, after = residual_of(next);
-    while (!(after.norm() < size) && fraction > 1e-4) {
-      fraction /= 2;
-      next = z - fraction * step;
+    Few<M> next, after;
+    const auto go = [&](double fraction) {
+      next = z - fraction * inverse.lazyProduct(residual);
       after = residual_of(next);
+    };
+    bool fell = false;
+    if constexpr (M == one) {
+      inverse(0, 0) = 1 / (1 - by_argument(0, 0) * laws.slope[0]);
+    } else {
+      const Few<M> slope = laws.slope;
+      go(1);
+      fell = after.norm() < quickly * size;
+      if (!fell) inverse = (FewSquare<M>::Identity(m, m) - by_argument * slope.asDiagonal()).partialPivLu().inverse();
     }
-    const bool stuck = !(after.norm() < size);
-    if (stuck) break;
+    if (!fell) go(1);
+    for (double fraction = 0.5; !(after.norm() < size) && fraction > 1e-4; fraction /= 2) go(fraction);
+    if (!(after.norm() < size)) break;  // stuck
     z = next;
     residual = after;
   }
@@ -146,7 +147,7 @@ class Follower {
     response_.output.resize(samples_, one_.channels);
     const Index columns = directions_ + one_.parameters;
     response_.tangent.assign(static_cast<std::size_t>(columns > 0 ? one_.channels : 0), MatrixXd(samples_, columns));
-    now_ = MatrixXd::Zero(one_.inputs(), block + 1);
+    now_ = MatrixXd::Zero(one_.inputs() + m, block + 1);
     slope_ = MatrixXd::Zero(one_.arguments, block + 1);
     stepped_ = VectorXd::Zero(one_.rows());
     start_laws();
@@ -161,12 +162,13 @@ class Follower {
 
   /// The forces where the stretch begins, which the laws may see in the accelerations.
   void start_laws() {
+    inverse_ = FewSquare<M>::Identity(one_.arguments, one_.arguments);
     const MatrixXd of_forces = arguments_.sees_input.value.rightCols(one_.feedbacks);
     VectorXd known = arguments_.sees.value * drive_.start;
     if (one_.measured > 0) known += arguments_.sees_input.value.leftCols(one_.measured) * drive_.input.row(0).transpose();
     z_ = known;
     laws_.at(z_);
-    if (arguments_.accelerations) z_ = implicit_argument<M>(laws_, known, of_forces, of_forces(Eigen::all, arguments_.owner), z_);
+    if (arguments_.accelerations) z_ = implicit_argument<M>(laws_, known, of_forces, of_forces(Eigen::all, arguments_.owner), z_, inverse_);
   }
 
   void start_tangents() {
@@ -206,7 +208,7 @@ class Follower {
 
   auto law_partials(Index k) { return law_partial_.middleCols(k * one_.parameters, one_.parameters); }
 
-  /// The response itself; leaves v of every sample in now_, the laws' slopes in slope_.
+  /// The response itself; leaves v and the force at the end of every step in now_, the laws' slopes in slope_.
   void march(Index first, Index count) {
     const Index n = one_.states, m = one_.feedbacks, q = one_.measured;
     for (Index k = 0; k < count; ++k) {
@@ -220,12 +222,12 @@ class Follower {
       }
       small_product(one_.step.data(), one_.rows(), one_.inputs(), v.data(), 0, 1, stepped_.data(), 0);
       if (part == 0) response_.output.row(sample) = stepped_.segment(one_.output(), one_.channels).transpose();
-      z_ = implicit_argument<M>(laws_, stepped_.segment(one_.argument(), one_.arguments), gain_, by_argument_, z_);
+      z_ = implicit_argument<M>(laws_, stepped_.segment(one_.argument(), one_.arguments), gain_, by_argument_, z_, inverse_);
       next.head(n) = stepped_.head(n);
       for (Index i = 0; i < m; ++i) {
         const double force = laws_.force[i], z = z_[arguments_.first[static_cast<std::size_t>(i)]];
         next.head(n) += force * one_.late.col(i).head(n);
-        next[one_.force() + i] = force;
+        next[one_.force() + i] = v[one_.inputs() + i] = force;
         largest_[i] = std::max(largest_[i], std::abs(z));
       }
       slope_.col(k + 1) = laws_.slope;
@@ -273,11 +275,12 @@ class Follower {
   /// The tangents in the parameters over the same steps: dx' = step dv + dstep v + late df + dlate f, df = slope dz + partial, where dz is solved for.
   void carry_parameters(Index first, Index count) {
     const Index n = one_.states, m = one_.feedbacks, p = one_.parameters, rows = one_.rows();
-    source_.noalias() = one_.partial * now_.leftCols(count);
-    source_.noalias() += one_.late_partial * now_.block(one_.force(), 1, m, count);
+    source_.resize(rows, static_cast<Index>(one_.partials.size()) * count);
+    for (std::size_t i = 0; i < one_.partials.size(); ++i)
+      small_product(one_.partials[i].both.data(), rows, now_.rows(), now_.data(), now_.rows(), count, source_.col(static_cast<Index>(i) * count).data(), rows);
     for (Index k = 0; k < count; ++k) {
       small_product(one_.step.data(), rows, one_.jerk(), tangent_.data(), tangent_.rows(), p, next_.data(), next_.rows());
-      for (Index j = 0; j < p; ++j) next_.col(j) += source_.col(k).segment(j * rows, rows);
+      for (std::size_t i = 0; i < one_.partials.size(); ++i) next_.col(one_.partials[i].parameter) += source_.col(static_cast<Index>(i) * count + k);
       if ((first + k) % per_sample_ == 0)
         for (Index c = 0; c < one_.channels; ++c) response_.tangent[static_cast<std::size_t>(c)].row((first + k) / per_sample_).tail(p) = next_.row(one_.output() + c);
       next_ += one_.late.lazyProduct(law_partials(k + 1));
@@ -317,8 +320,10 @@ class Follower {
   Index directions_;
   FewSquare<M> gain_;         // arguments x feedbacks: how the force at the end of a step moves what the laws see there
   FewSquare<M> by_argument_;  // the same for each argument's feedback
+  FewSquare<M> inverse_;      // of 1 - by_argument_ slope, at a step before
   NonlinearResponse response_;
-  MatrixXd now_, slope_, law_partial_, source_;
+  MatrixXd now_;  // of each step v, and f at its end
+  MatrixXd slope_, law_partial_, source_;
   MatrixXd tangent_, next_;  // of [x; f] in the parameters, and the rows of a step
   std::optional<BlockOfSteps> block_, last_block_;
   BlockOfSteps::Work work_;

@@ -42,8 +42,6 @@ StepMatrices::StepMatrices(const LinearSystem& system, const ExactStep& exact, c
   const auto value = [](const DualMatrix& m) { return &m.value; };
   fill(system, exact, seen.sees.value, value, step, late);
   see(seen.sees_input.value, step, late);
-  partial.resize(parameters * rows(), inputs());
-  late_partial.resize(parameters * rows(), feedbacks);
   MatrixXd d_step, d_late;
   for (Index j = 0; j < parameters; ++j) {
     fill(system, exact, seen.sees.value, [j](const DualMatrix& m) { return m.depends_on(j) ? &m.d(j) : nullptr; }, d_step, d_late);
@@ -52,8 +50,9 @@ StepMatrices::StepMatrices(const LinearSystem& system, const ExactStep& exact, c
       d_late.middleRows(argument(), arguments) += seen.sees.d(j) * late.topRows(states);
     }
     if (seen.sees_input.depends_on(j)) see(seen.sees_input.d(j), d_step, d_late);
-    partial.middleRows(j * rows(), rows()) = d_step;
-    late_partial.middleRows(j * rows(), rows()) = d_late;
+    if (d_step.isZero(0) && d_late.isZero(0)) continue;
+    partials.push_back({j, MatrixXd(rows(), inputs() + feedbacks)});
+    partials.back().both << d_step, d_late;
   }
 }
 

@@ -1,5 +1,6 @@
 #pragma once
 #include <Eigen/Core>
+#include <vector>
 
 #include "core/propagate/exact_step.h"
 #include "core/propagate/feedback_force.h"
@@ -12,8 +13,12 @@ struct StepMatrices {
   Eigen::Index states, feedbacks, arguments, channels, measured, parameters;
   Eigen::MatrixXd step;     ///< rows x inputs
   Eigen::MatrixXd late;     ///< rows x feedbacks: what the force at the end of the step adds
-  Eigen::MatrixXd partial;  ///< (rows P) x inputs, parameter by parameter
-  Eigen::MatrixXd late_partial;
+  /// Of a parameter on which the two depend: [d step | d late].
+  struct Partial {
+    Eigen::Index parameter;
+    Eigen::MatrixXd both;
+  };
+  std::vector<Partial> partials;
 
   Eigen::Index rows() const { return step.rows(); }
   Eigen::Index inputs() const { return step.cols(); }

@@ -5,36 +5,15 @@
 #include <cmath>
 #include <utility>
 
-#include "core/propagate/feedback_force.h"
 #include "core/model/run_inputs.h"
+#include "core/numerics/triangularise.h"
+#include "core/propagate/feedback_force.h"
 
 namespace unrig {
-namespace {
-
 using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::RowVectorXd;
 using Eigen::VectorXd;
-
-/// Reflects the rows such that the first `pivots` columns are upper triangular (Householder); the other columns follow.
-void triangularise(Eigen::Ref<MatrixXd> rows, Index pivots) {
-  for (Index j = 0; j < std::min(pivots, rows.rows() - 1); ++j) {
-    auto below = rows.col(j).tail(rows.rows() - j);
-    const double length = below.stableNorm();
-    if (!(length > 0)) continue;
-    const double end = below[0] > 0 ? -length : length;
-    below[0] -= end;  // the reflector, in the place of what it takes away
-    const double half = -end * below[0];
-    for (Index k = j + 1; k < rows.cols(); ++k) {
-      auto other = rows.col(k).tail(rows.rows() - j);
-      other -= below.dot(other) / half * below;
-    }
-    below.setZero();
-    below[0] = end;
-  }
-}
-
-}  // namespace
 
 LawSmoother::LawSmoother(const RunResidual& run, std::vector<Index> parameters) : run_(run), parameters_(std::move(parameters)), inputs_(run_inputs(run.run(), run.conditions())) {
   const std::vector<std::string> names = run.model().output_channels(run.run());
