@@ -42,9 +42,11 @@ template <int W>
   for (int w = 0; w < W; ++w) squares += lanes[w];
   constexpr double small = 1e-280, large = 1e280;
   if (squares > small && squares < large) return std::sqrt(squares);
-  double far = 0;
-  for (std::ptrdiff_t i = 0; i < length; ++i) far = std::hypot(far, a[i]);
-  return far;
+  double largest = 0, scaled = 0;
+  for (std::ptrdiff_t i = 0; i < length; ++i) largest = std::fmax(largest, std::fabs(a[i]));
+  if (!(largest > 0)) return 0;
+  for (std::ptrdiff_t i = 0; i < length; ++i) scaled += a[i] / largest * (a[i] / largest);
+  return largest * std::sqrt(scaled);
 }
 
 template <int W>
