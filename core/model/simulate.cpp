@@ -137,6 +137,25 @@ VectorXd start_of(const SimulateProblem& problem, const LinearSystem& system, co
   return start;
 }
 
+/// One sample after the other, so that the signals can change in between.
+MatrixXd response_with_steps(const SimulateProblem& problem, const LinearSystem& system, const ExactStep& step, VectorXd state, const VectorXd& jerk, const MatrixXd& input) {
+  const Index samples = problem.run.samples();
+  if (problem.signal_steps.rows() != samples || problem.signal_steps.cols() != static_cast<Index>(system.exogenous.size()))
+    throw std::invalid_argument(fmt::format("steps of {} signals in {} samples, of {} signals in {} samples", problem.signal_steps.cols(), problem.signal_steps.rows(), system.exogenous.size(), samples));
+  MatrixXd output(samples, system.C.rows());
+  NonlinearDrive from{std::move(state), {}, MatrixXd(2, 0), MatrixXd(system.states(), 0), {}};
+  for (Index k = 0; k < samples; ++k) {
+    if (jerk.size() > 0) from.jerk = jerk.segment(k, 1);
+    if (input.cols() > 0) from.input = input.middleRows(k, 2);
+    const NonlinearResponse response = follow(system, step, problem.theta, from, 1, Partials::none);
+    if (!response.finite) throw NoAnswer(problem.run.file + ": the response with its nonlinear effects grows beyond all bounds");
+    output.row(k) = response.output;
+    from.start = response.end;
+    from.start(system.exogenous) += problem.signal_steps.row(k).transpose();
+  }
+  return output;
+}
+
 /// Of motion, measured inputs and start in one pass: with nonlinear effects they do not add up. Jumps are added by themselves, to a linear system.
 MatrixXd response_of(const SimulateProblem& problem, const LinearSystem& system, const Conditions& conditions) {
   const Run& run = problem.run;
@@ -147,6 +166,7 @@ MatrixXd response_of(const SimulateProblem& problem, const LinearSystem& system,
   const MatrixXd input = inputs_of(run, conditions);
   const VectorXd start = start_of(problem, system, motion);
   const ExactStep step = step_to_follow(system, run.dt);
+  if (problem.signal_steps.size() > 0 && !jumps) return response_with_steps(problem, system, step, start, motion.jerk, input);
   if (!system.feedback.empty()) {
     const NonlinearResponse response = follow(system, step, problem.theta, {start, motion.jerk, input, MatrixXd(system.states(), 0), {}}, run.samples(), Partials::none);
     if (!response.finite) throw NoAnswer(run.file + ": the response with its nonlinear effects grows beyond all bounds");

@@ -350,9 +350,9 @@ PYBIND11_MODULE(_unrig, m) {
         },
         progress);
   });
-  m.def("trial", [](const Rig& rig, const std::vector<Run>& recordings, const std::vector<std::string>& effects, int trials, unsigned seed, bool pairs, std::optional<double> noise, const py::object& progress) {
+  m.def("trial", [](const Rig& rig, const std::vector<Run>& recordings, const std::vector<std::string>& effects, int trials, unsigned seed, bool pairs, std::optional<double> noise, bool ideal, const py::object& progress) {
     TrialProblem problem;
-    problem.rig = rig, problem.recordings = recordings, problem.trials = trials, problem.seed = seed, problem.pairs = pairs, problem.noise = noise;
+    problem.rig = rig, problem.recordings = recordings, problem.trials = trials, problem.seed = seed, problem.pairs = pairs, problem.noise = noise, problem.ideal = ideal;
     problem.effects = effects_of_option("effects", effects);
     problem.rig.givens = nullptr;  // as the command
     for (Run& run : problem.recordings) run.givens = nullptr;

@@ -74,6 +74,17 @@ void add_shares(ReportPage& page, const json& effects, int nulls, int alarms) {
     page.add_bars("What was found of what was hidden", "campaigns [%]", bars, "Of the campaigns that hid an effect, those in which it was named; of those that hid nothing, those in which something was named. Lines: 95 % intervals (Wilson) of the share, for so many campaigns.");
 }
 
+/// Reliability diagram: of names stated with such probabilities, how many were right.
+void add_reliability(ReportPage& page, const json& reliability) {
+  std::vector<Bar> bars;
+  for (const json& bin : reliability.value("bins", json::array()))
+    bars.push_back(share_of(fmt::format("stated {} to {}, {} in the mean", plain(number_of(bin, "from"), 3), plain(number_of(bin, "to"), 3), plain(number_of(bin, "stated"), 3)), bin.value("right", 0), bin.value("campaigns", 1), 1));
+  if (!bars.empty())
+    page.add_bars("Do stated probabilities hold?", "right names [%]", bars,
+                  fmt::format("Of the campaigns in which something was named with such a probability, those in which that is just what was hidden. Lines: 95 % intervals (Wilson). Calibration error {}, Brier score {}.",
+                              plain(number_of(reliability, "calibration_error"), 3), plain(number_of(reliability, "brier"), 3)));
+}
+
 void add_failures(ReportPage& page, const json& trials) {
   for (const json& trial : trials)
     if (const std::string failure = text_of(trial, "failure"); !failure.empty()) page.add_text("Warning: a campaign failed: " + failure);
@@ -97,6 +108,7 @@ void add_trial(ReportPage& page, const json& result, const std::string& path) {
   add_shares(page, result.at("effects"), nulls, alarms);
   add_confusion(page, result.at("confusion"));
   add_sizes(page, result.at("effects"));
+  if (const json reliability = result.value("reliability", json::object()); reliability.is_object()) add_reliability(page, reliability);
   add_failures(page, trials);
   add_provenance(page, result);
 }

@@ -4,6 +4,8 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
+#include <array>
+#include <cmath>
 #include <exception>
 #include <mutex>
 #include <optional>
@@ -45,13 +47,27 @@ std::vector<PlannedRun> plan(const TrialProblem& problem, std::mt19937_64& rando
   return problem.recordings.empty() ? draw_runs(problem.noise.value_or(usual_noise), random) : runs_like(problem.rig, problem.recordings, problem.noise, random);
 }
 
+/// Without readings, in the recorded steps.
+std::vector<Run> recorded_runs(const std::vector<PlannedRun>& planned) {
+  std::vector<Run> runs;
+  for (const PlannedRun& run : planned) {
+    runs.push_back(run.fine);
+    runs.back().dt *= static_cast<double>(PlannedRun::finer);
+  }
+  return runs;
+}
+
 TrialOutcome run_trial(const TrialProblem& problem, const Strings& effects, std::size_t trial) {
   std::mt19937_64 random = random_of(problem.seed, trial);
   TrialOutcome outcome;
   outcome.trial = trial;
   if (!problem.nulls) outcome.hidden = hidden_in(effects, trial, problem.pairs, random);
   try {
-    const TrialCampaign campaign = draw_campaign(problem.rig, outcome.hidden, plan(problem, random), random);
+    const std::vector<PlannedRun> planned = plan(problem, random);
+    const Laboratory laboratory = problem.ideal ? ideal_laboratory() : draw_laboratory(problem.rig, recorded_runs(planned), random);
+    outcome.noise = to_string(laboratory.noise);
+    outcome.misread = laboratory.misread;
+    const TrialCampaign campaign = draw_campaign(problem.rig, outcome.hidden, planned, laboratory, random);
     outcome.parameters = campaign.parameters;
     outcome.size = campaign.size;
     outcome.sizes = campaign.sizes;
@@ -67,6 +83,8 @@ TrialOutcome run_trial(const TrialProblem& problem, const Strings& effects, std:
     outcome.mismatch = d.mismatch.found;
     outcome.unexplained = d.unexplained;
     outcome.seconds = d.seconds;
+    for (const Candidate& c : d.ranking)
+      if (!outcome.found.empty() && name_of(c.effects) == name_of(outcome.found)) outcome.probability = c.probability;
   } catch (const std::exception& e) {
     outcome.failure = e.what();
   }
@@ -97,9 +115,39 @@ EffectScore score_of(const std::string& id, const std::vector<TrialOutcome>& out
   return score;
 }
 
+Reliability reliability_of(const std::vector<TrialOutcome>& outcomes) {
+  constexpr std::array edges{0.0, 0.5, 0.8, 0.9, 0.95, 0.99, 1.0};
+  Reliability all;
+  for (std::size_t b = 0; b + 1 < edges.size(); ++b) {
+    Reliability::Bin bin{edges[b], edges[b + 1]};
+    for (const TrialOutcome& o : outcomes) {
+      if (!o.probability || *o.probability < bin.from || (*o.probability >= bin.to && b + 2 < edges.size())) continue;
+      ++bin.campaigns;
+      bin.right += o.right() ? 1 : 0;
+      bin.stated += *o.probability;
+      all.brier += std::pow(*o.probability - (o.right() ? 1 : 0), 2);
+    }
+    if (bin.campaigns == 0) continue;
+    all.calibration_error += std::abs(bin.stated - bin.right);
+    all.campaigns += bin.campaigns;
+    bin.stated /= bin.campaigns;
+    all.bins.push_back(bin);
+  }
+  if (all.campaigns > 0) all.calibration_error /= all.campaigns, all.brier /= all.campaigns;
+  return all;
+}
+
 }  // namespace
 
-bool TrialOutcome::right() const { return failure.empty() && name_of(found) == name_of(hidden); }
+bool TrialOutcome::right() const {
+  Strings named = found;
+  if (!misread.empty()) std::erase(named, rig_description_id);
+  return failure.empty() && name_of(named) == name_of(hidden);
+}
+
+bool TrialOutcome::false_name() const {
+  return std::any_of(found.begin(), found.end(), [&](const std::string& id) { return !has(hidden, id) && !(id == rig_description_id && !misread.empty()); });
+}
 
 bool TrialOutcome::among_equivalent() const {
   return std::any_of(equivalent.begin(), equivalent.end(), [&](const Strings& set) { return name_of(set) == name_of(hidden); });
@@ -115,12 +163,13 @@ void tally(TrialResult& result) {
     }
     if (o.hidden.empty()) {
       ++result.nulls;
-      if (!o.found.empty() || o.unexplained) ++result.false_alarms;
+      if (o.false_name() || o.unexplained) ++result.false_alarms;
       continue;
     }
     if (o.found.empty()) ++result.misses;
-    if (std::any_of(o.found.begin(), o.found.end(), [&](const std::string& id) { return !has(o.hidden, id); })) ++result.wrong_names;
+    if (o.false_name()) ++result.wrong_names;
   }
+  result.reliability = reliability_of(result.outcomes);
   for (const std::string& id : result.effects) result.scores[id] = score_of(id, result.outcomes);
 }
 
@@ -134,11 +183,7 @@ TrialResult run_trials(const TrialProblem& problem) {
   Strings ids = problem.effects;
   std::mt19937_64 any;
   const std::vector<PlannedRun> planned = plan(problem, any);
-  std::vector<Run> runs;
-  for (const PlannedRun& run : planned) {
-    runs.push_back(run.fine);
-    runs.back().dt *= static_cast<double>(PlannedRun::finer);
-  }
+  const std::vector<Run> runs = recorded_runs(planned);
   Rig hiding = problem.rig;
   hiding.normal.modes = 1;  // as the rig of a campaign that hides modes
   if (ids.empty()) ids = effects_that_act(hiding, runs);

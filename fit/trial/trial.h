@@ -20,6 +20,7 @@ struct TrialProblem {
   bool pairs = false;                ///< hide two effects at a time
   bool nulls = false;                ///< hide nothing, in no campaign: how often is something named that is not there?
   bool outside = false;              ///< what is hidden is not among the candidates: nothing should be named
+  bool ideal = false;                ///< white noise, exact files and steady signals instead of what a laboratory adds (fit/trial/laboratory.h)
   unsigned seed = 1;
   std::vector<Run> recordings;       ///< whose conditions, motion, sampling and noise the simulated runs repeat; none: runs are drawn
   std::optional<double> noise;       ///< of the gauge [N]; without it that of the recordings, or 0.03
@@ -37,11 +38,15 @@ struct TrialOutcome {
   std::vector<double> parameters;
   double size = 0;             ///< largest r.m.s. of a run that the hidden effects make, over the noise
   std::vector<double> sizes;   ///< of each hidden effect by itself, in the order of `hidden`
+  std::string noise;           ///< kind of the gauge's noise
+  std::string misread;         ///< group of the numbers by which the files are off; empty: none
+  std::optional<double> probability;  ///< that the diagnosis gives what it found; none where nothing is named
   bool mismatch = false, unexplained = false;
   double seconds = 0;
   std::string failure;         ///< what the diagnosis threw, if it did
 
-  bool right() const;          ///< exactly what was hidden was found
+  bool right() const;          ///< exactly what was hidden was found; beside it, where files are misread, the rig's description may be
+  bool false_name() const;     ///< something was found that was not there
   bool among_equivalent() const;
 };
 
@@ -50,6 +55,19 @@ struct EffectScore {
   int hidden = 0, found = 0, equivalent = 0;  ///< `equivalent`: not named, but among the sets that the diagnosis calls as good
   double smallest_found = 0;      ///< smallest size that was found
   double nine_in_ten = 0;         ///< least size from which on nine in ten were found; 0: there is none
+};
+
+/// Do stated probabilities hold? Over the campaigns in which something was named.
+struct Reliability {
+  struct Bin {
+    double from = 0, to = 1;
+    int campaigns = 0, right = 0;
+    double stated = 0;  ///< mean probability
+  };
+  std::vector<Bin> bins;         ///< with campaigns in them
+  int campaigns = 0;
+  double calibration_error = 0;  ///< mean over campaigns of how far a bin's share of right names is from the mean probability in it
+  double brier = 0;              ///< mean square of probability less 1 for a right, 0 for a wrong name
 };
 
 struct TrialResult {
@@ -62,6 +80,7 @@ struct TrialResult {
   std::map<std::string, EffectScore> scores;
   int nulls = 0, false_alarms = 0;    ///< campaigns with nothing hidden, and those of them where something was named
   int wrong_names = 0, misses = 0;    ///< with something hidden: an effect was named that was not there; nothing was named
+  Reliability reliability;
   int failures = 0;                   ///< campaigns that could not be drawn or diagnosed: in none of these counts
   unsigned seed = 0;
   std::vector<std::string> recordings;  ///< files that the simulated runs repeat

@@ -1,16 +1,19 @@
 #include "fit/trial/trial_campaign.h"
 
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
 
 #include "core/effects/effect.h"
 #include "core/files/error.h"
 #include "core/model/simulate.h"
+#include "core/propagate/exact_step.h"
 
 namespace unrig {
 namespace {
 
 using Eigen::Index;
+using Eigen::MatrixXd;
 using Eigen::VectorXd;
 using Random = std::mt19937_64;
 using Strings = std::vector<std::string>;
@@ -136,12 +139,43 @@ void draw_signals(const std::vector<PlannedRun>& runs, std::vector<SimulateProbl
   for (SimulateProblem& problem : problems) problem.signals *= wanted / disturbed;
 }
 
+/// Signals whose phase walks: what they change by behind each sample to stay on the circle on which they begin, the two states of each hidden effect whose signals wander.
+MatrixXd walking_phases(const Strings& hidden, const AeroelasticModel& bare, const SimulateProblem& problem, double walk, Random& random) {
+  const LinearSystem system = problem.model.system(conditions_of(problem.run), problem.theta, {"gauge"});
+  const ExactStep step = exact_step(system, problem.run.dt);
+  MatrixXd steps;
+  Index first = 0;
+  for (const std::string& id : hidden) {
+    const AeroelasticModel one = bare.with_effects({id});
+    const auto count = static_cast<Index>(one.system(conditions_of(problem.run), one.start_values(), {"gauge"}).exogenous.size());
+    if (effect(id).noise && count == 2) {
+      if (steps.size() == 0) steps = MatrixXd::Zero(problem.run.samples(), static_cast<Index>(system.exogenous.size()));
+      const std::vector<Index> own{system.exogenous[static_cast<std::size_t>(first)], system.exogenous[static_cast<std::size_t>(first) + 1]};
+      const Eigen::Matrix2d on = step.transition.value(own, own);
+      Eigen::Vector2d z = problem.signals.segment(first, 2);
+      const VectorXd turns = walk * std::sqrt(problem.run.dt) * white_noise(problem.run.samples(), random);
+      for (Index k = 0; k < turns.size(); ++k) {
+        const Eigen::Vector2d after = on * z;
+        z = Eigen::Rotation2Dd(turns[k]) * after;
+        steps.block(k, first, 1, 2) = (z - after).transpose();
+      }
+    }
+    first += count;
+  }
+  return steps;
+}
+
+/// What a converter with steps of this size makes of it.
+VectorXd rounded(const VectorXd& reading, double size) { return size * (reading / size).array().round(); }
+
 /// With noise, and whatever else the readings have.
-Run recorded(const Run& fine, const PlannedRun& planned, const Rig& rig, Random& random) {
+Run recorded(const Run& fine, const PlannedRun& planned, const Rig& rig, const Laboratory& laboratory, Random& random) {
   Run run = every_nth(fine, PlannedRun::finer);
   std::erase_if(run.channels, [&](const Channel& c) { return !is_recorded(c, rig); });
   for (Channel& c : run.channels) {
-    c.value += noise_of(c, fine, planned) * white_noise(c.value.size(), random);
+    const double noise = noise_of(c, fine, planned);
+    c.value += noise * (c.name == "gauge" ? draw_noise(laboratory, c.value.size(), run.dt, random) : white_noise(c.value.size(), random));
+    if (c.name == "gauge" && laboratory.converter > 0) c.value = rounded(c.value, laboratory.converter * noise);
     if (const Channel* beside = planned.disturbed.find(c.name)) c.value += beside->value;
   }
   return run;
@@ -154,7 +188,7 @@ void check_for_trials(const Rig& rig) {
     throw InputError({rig.file, 0}, "the rig cannot be plucked and pitched", "wanted a beam rig with a gauge, a calibration element and a submerged section", "");
 }
 
-TrialCampaign draw_campaign(const Rig& rig, const Strings& hidden, const std::vector<PlannedRun>& runs, Random& random) {
+TrialCampaign draw_campaign(const Rig& rig, const Strings& hidden, const std::vector<PlannedRun>& runs, const Laboratory& laboratory, Random& random) {
   check_for_trials(rig);
   TrialCampaign campaign;
   campaign.hidden = hidden;
@@ -178,16 +212,19 @@ TrialCampaign draw_campaign(const Rig& rig, const Strings& hidden, const std::ve
   std::vector<SimulateProblem> problems;
   for (const PlannedRun& planned : runs) problems.push_back(problem_of(model, theta, planned));
   draw_signals(runs, problems, random);
+  if (laboratory.phase_walk > 0)
+    for (SimulateProblem& problem : problems) problem.signal_steps = walking_phases(hidden, bare, problem, laboratory.phase_walk, random);
   for (std::size_t r = 0; r < runs.size(); ++r) {
     const Run fine = simulate(problems[r]).run;
     if (!hidden.empty()) campaign.size = std::max(campaign.size, apart(fine, simulate(problem_of(modes_hidden ? one_mode : bare, rig_theta, runs[r])).run, rig, runs[r]));
-    campaign.runs.push_back(recorded(fine, runs[r], rig, random));
+    campaign.runs.push_back(recorded(fine, runs[r], rig, laboratory, random));
   }
   campaign.sizes.assign(hidden.size(), 0);
   for (std::size_t k = 0; k < hidden.size(); ++k) {
     const Alone alone = beside_the_rig(hidden[k], effect(hidden[k]).enriches_basis ? one_mode : bare, bare, model, theta);
     for (std::size_t r = 0; r < runs.size(); ++r) campaign.sizes[k] = std::max(campaign.sizes[k], trace_of(alone, runs[r], own_signals(hidden, k, bare, problems[r])));
   }
+  misread(laboratory, campaign.rig, campaign.runs, random);
   return campaign;
 }
 

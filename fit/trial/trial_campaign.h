@@ -5,6 +5,7 @@
 
 #include "core/rig/rig.h"
 #include "core/run/run.h"
+#include "fit/trial/laboratory.h"
 #include "fit/trial/trial_plan.h"
 
 namespace unrig {
@@ -12,7 +13,7 @@ namespace unrig {
 /// A campaign that was never recorded, with effects hidden in it.
 struct TrialCampaign {
   Rig rig;                         ///< what a diagnosis is given: the rig file's values, not the truth
-  std::vector<Run> runs;
+  std::vector<Run> runs;           ///< likewise
   std::vector<std::string> hidden;
   std::vector<double> parameters;  ///< of the hidden effects, one after the other
   double size = 0;                 ///< what they change: the largest r.m.s. of a channel in a run, over its noise
@@ -20,10 +21,10 @@ struct TrialCampaign {
 };
 
 /// Simulates these runs with the effects at work. Stiffness, damping and apparent mass are drawn around the rig file's, the effects' sizes as each
-/// of them says (Effect::draw). Sensors of the rig are recorded too, with a noise as small beside their reading as the gauge's. The truth has every normal mode, circulation within 1e-6 and a quarter of the recorded step. `rig` has all its modes, unless `higher-mode` is hidden: then it has one.
+/// of them says (Effect::draw); the laboratory adds its noise, misread numbers and walking phases. Sensors of the rig are recorded too, with a noise as small beside their reading as the gauge's. The truth has every normal mode, circulation within 1e-6 and a quarter of the recorded step. `rig` has all its modes, unless `higher-mode` is hidden: then it has one.
 ///
 /// Throws InputError where the rig has no section, gauge or calibration element.
-TrialCampaign draw_campaign(const Rig& rig, const std::vector<std::string>& hidden, const std::vector<PlannedRun>& runs, std::mt19937_64& random);
+TrialCampaign draw_campaign(const Rig& rig, const std::vector<std::string>& hidden, const std::vector<PlannedRun>& runs, const Laboratory& laboratory, std::mt19937_64& random);
 
 /// Throws as draw_campaign would.
 void check_for_trials(const Rig& rig);

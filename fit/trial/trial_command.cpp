@@ -33,6 +33,7 @@ int trial_command(int argc, char** argv) {
   app.add_option("--noise", noise, "standard deviation of the gauge's noise; without it that of the recordings, or 0.03 N");
   app.add_flag("--outside", problem.outside, "keep what is hidden from the candidates: the right verdict is `unexplained`");
   app.add_flag("--nulls", problem.nulls, "hide nothing in any campaign: every name is a false alarm")->excludes(pairs)->excludes("--outside");
+  app.add_flag("--ideal", problem.ideal, "white noise, exact files and steady signals. Without it noise may be first-order, pink, heavy-tailed or quantised, in half of the campaigns one kind of number in the files is off, and the phase of vortex shedding walks");
   app.add_option("--shard", shard, "i/n: only every n-th campaign, from the i-th on, for `unrig collect` to put together; without it, what falls to this task of Slurm (SLURM_ARRAY_TASK_ID) or this rank of Open MPI");
   app.add_option("--cases", problem.cases, "folder in which the outcome of each campaign is kept: a second call computes only what is missing");
   app.add_option_function<int>("--threads", use_threads, "how many threads to work in; without it, as many as the machine has")->check(CLI::Range(1, 256));

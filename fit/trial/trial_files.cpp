@@ -24,6 +24,9 @@ constexpr const char* wanted = "wanted what `unrig trial -o` wrote";
 ordered_json json_of(const TrialOutcome& o, bool seconds) {
   ordered_json one = {{"trial", o.trial},           {"hidden", o.hidden},         {"parameters", o.parameters},   {"size", o.size},    {"sizes", o.sizes}, {"found", o.found},
                       {"equivalent", o.equivalent}, {"mismatch", o.mismatch},     {"unexplained", o.unexplained}, {"right", o.right()}};
+  one["noise"] = o.noise;
+  one["misread"] = o.misread.empty() ? ordered_json(nullptr) : ordered_json(o.misread);
+  one["probability"] = o.probability ? ordered_json(*o.probability) : ordered_json(nullptr);
   if (seconds) one["seconds"] = o.seconds;
   if (!o.failure.empty()) one["failure"] = o.failure;
   return one;
@@ -40,9 +43,18 @@ TrialOutcome outcome_of(const ordered_json& json) {
   json.at("equivalent").get_to(o.equivalent);
   json.at("mismatch").get_to(o.mismatch);
   json.at("unexplained").get_to(o.unexplained);
+  json.at("noise").get_to(o.noise);
+  if (const ordered_json& misread = json.at("misread"); !misread.is_null()) misread.get_to(o.misread);
+  if (const ordered_json& probability = json.at("probability"); !probability.is_null()) o.probability = probability.get<double>();
   o.seconds = json.value("seconds", 0.0);
   o.failure = json.value("failure", std::string());
   return o;
+}
+
+ordered_json json_of(const Reliability& r) {
+  ordered_json bins = ordered_json::array();
+  for (const Reliability::Bin& b : r.bins) bins.push_back({{"from", b.from}, {"to", b.to}, {"campaigns", b.campaigns}, {"stated", b.stated}, {"right", b.right}});
+  return {{"campaigns", r.campaigns}, {"calibration_error", r.calibration_error}, {"brier", r.brier}, {"bins", bins}};
 }
 
 }  // namespace
@@ -55,7 +67,7 @@ std::string to_json(const TrialResult& r, const Provenance& made, bool seconds) 
                       {"smallest_found", s.found > 0 ? ordered_json(s.smallest_found) : ordered_json(nullptr)},
                       {"found_nine_in_ten_from", s.nine_in_ten > 0 ? ordered_json(s.nine_in_ten) : ordered_json(nullptr)}});
   ordered_json json = {{"unrig", "trial"}, {"program", made.program}, {"command", made.command}, {"rig", r.rig_file}, {"rig_fingerprint", r.rig_fingerprint}, {"study", r.study}, {"seed", r.seed}, {"planned", r.trials}, {"noise", {{"gauge", r.noise}, {"unit", "N"}}}, {"recordings", r.recordings}, {"recording_fingerprints", r.recording_fingerprints}, {"nulls", r.nulls}, {"false_alarms", r.false_alarms},
-                       {"wrong_names", r.wrong_names}, {"misses", r.misses}, {"confusion", r.confusion}, {"effects", scores}, {"hidden_in_turn", r.effects}, {"trials", trials}};
+                       {"wrong_names", r.wrong_names}, {"misses", r.misses}, {"confusion", r.confusion}, {"reliability", json_of(r.reliability)}, {"effects", scores}, {"hidden_in_turn", r.effects}, {"trials", trials}};
   if (r.shards > 1) json["shard"] = fmt::format("{}/{}", r.shard, r.shards);
   return json.dump(2) + "\n";
 }
@@ -70,6 +82,10 @@ std::string report(const TrialResult& r) {
   text += "[[Size: largest r.m.s. of a run over the noise]]\n    effect               found  hidden  as good   least found   nine in ten from\n";
   const auto number = [](double x) { return x > 0 ? fmt::format("{:.3g}", x) : std::string("-"); };
   for (const auto& [id, s] : r.scores) text += fmt::format("    {:<20} {:5} {:7} {:8} {:>13} {:>18}\n", id, s.found, s.hidden, s.equivalent, number(s.smallest_found), number(s.nine_in_ten));
+  if (r.reliability.campaigns > 0) {
+    text += fmt::format("[[Stated probability -> share of right names]] calibration error {:.3f}, Brier score {:.3f}\n", r.reliability.calibration_error, r.reliability.brier);
+    for (const Reliability::Bin& b : r.reliability.bins) text += fmt::format("    {:.2f} to {:.2f}: stated {:.3f}, right {} of {}\n", b.from, b.to, b.stated, b.right, b.campaigns);
+  }
   for (const TrialOutcome& o : r.outcomes)
     if (!o.failure.empty()) text += fmt::format("    failed with {} hidden: {}\n", name_of(o.hidden), o.failure);
   return text;
@@ -109,6 +125,7 @@ TrialResult collected(const std::vector<TrialResult>& shards, const std::vector<
   all.outcomes = all_cases(parts, trials, [](const TrialOutcome& a, const TrialOutcome& b) { return json_of(a, false) == json_of(b, false); });
   all.confusion.clear();
   all.scores.clear();
+  all.reliability = {};
   all.nulls = all.false_alarms = all.wrong_names = all.misses = all.failures = 0;
   all.shard = all.shards = 1;
   tally(all);
@@ -120,6 +137,7 @@ std::string study_of(const TrialProblem& problem, const std::vector<std::string>
   for (const Run& run : problem.recordings) parts.push_back(base_name(run.file) + fingerprint(run, problem.rig));
   parts.insert(parts.end(), effects.begin(), effects.end());
   if (problem.nulls) parts.emplace_back("nulls");
+  if (problem.ideal) parts.emplace_back("ideal");
   return fingerprint(std::string_view(fmt::format("{}", fmt::join(parts, "\n"))));
 }
 

@@ -221,5 +221,23 @@ TEST_F(SimulateNonlinearStep, SignalsStartAsTold) {
   EXPECT_THROW(simulate(wave), std::invalid_argument);
 }
 
+/// A linear rig answers to a signal that jumps in the middle as to one that begins there.
+TEST_F(SimulateNonlinearStep, SignalsThatStepAddUp) {
+  SimulateProblem wave = problem("tank-wave");
+  const VectorXd still = simulate(wave).run.channel("gauge").value;
+  wave.signals = Eigen::Vector2d(3, 1);
+  const VectorXd from_the_start = simulate(wave).run.channel("gauge").value - still;
+  const Eigen::Index samples = wave.run.samples(), later = samples / 3;
+  wave.signals.setZero();
+  wave.signal_steps = Eigen::MatrixXd::Zero(samples, 2);
+  EXPECT_LT((simulate(wave).run.channel("gauge").value - still).cwiseAbs().maxCoeff(), 1e-9 * still.cwiseAbs().maxCoeff()) << "step by step";
+  wave.signal_steps.row(later - 1) << 3, 1;
+  const VectorXd with_it = simulate(wave).run.channel("gauge").value - still;
+  EXPECT_LT(with_it.head(later).cwiseAbs().maxCoeff(), 1e-9 * still.cwiseAbs().maxCoeff());
+  EXPECT_LT((with_it.tail(samples - later) - from_the_start.head(samples - later)).cwiseAbs().maxCoeff(), 1e-9 * still.cwiseAbs().maxCoeff());
+  wave.signal_steps.resize(samples - 1, 2);
+  EXPECT_THROW(simulate(wave), std::invalid_argument);
+}
+
 }  // namespace
 }  // namespace unrig

@@ -63,7 +63,7 @@ int study(int argc, char** argv) {
     const auto trial = static_cast<unsigned>(i) / static_cast<unsigned>(ids.size());
     std::seed_seq sequence{seed, trial};
     std::mt19937_64 random(sequence);
-    const TrialCampaign campaign = draw_campaign(rig, {id}, draw_runs(noise, random), random);
+    const TrialCampaign campaign = draw_campaign(rig, {id}, draw_runs(noise, random), ideal_laboratory(), random);
     if (campaign.size < least) return;
     FitProblem problem;
     problem.rig = campaign.rig;

@@ -115,6 +115,6 @@ def apparent_mass(rig: Union[Path, Rig], dry: Union[Path, Run], wet: Union[Path,
 
 
 def trial(rig: Union[Path, Rig], recordings: Iterable[Union[Path, Run]] = (), *, effects: Sequence[str] = (), trials: int = 20, seed: int = 1, pairs: bool = False, noise: Optional[float] = None,
-          progress: Progress = None) -> TrialResult:
-    """How often `diagnose` finds what was hidden in simulated campaigns, as `unrig trial`. noise: of the gauge [N]."""
-    return TrialResult(*_unrig.trial(as_rig(rig), [as_run(run) for run in recordings], list(effects), trials, seed, pairs, noise, progress))
+          ideal: bool = False, progress: Progress = None) -> TrialResult:
+    """How often `diagnose` finds what was hidden in simulated campaigns, as `unrig trial`. noise: of the gauge [N]. ideal: white noise, exact files, steady signals."""
+    return TrialResult(*_unrig.trial(as_rig(rig), [as_run(run) for run in recordings], list(effects), trials, seed, pairs, noise, ideal, progress))

@@ -30,7 +30,7 @@ TrialCampaign pair(unsigned seed, unsigned trial, const Strings& hidden, bool li
   for (const char* run : {"dry_pluck", "wet_pluck", "step_a", "step_b", "step_c"})
     if (like_recordings) recordings.push_back(read_run(test::null_campaign(std::string(run) + ".csv")));
   const std::vector<PlannedRun> runs = like_recordings ? runs_like(rig, recordings, {}, random) : draw_runs(0.03, random);
-  return draw_campaign(rig, hidden, runs, random);
+  return draw_campaign(rig, hidden, runs, ideal_laboratory(), random);
 }
 
 /// An opened campaign, beside the repository.

@@ -67,7 +67,7 @@ struct Hidden {
 Hidden hide(const std::string& effect, unsigned seed, unsigned trial) {
   std::seed_seq sequence{seed, trial};
   std::mt19937_64 random(sequence);
-  const TrialCampaign campaign = draw_campaign(read_rig(test::null_campaign("rig.toml")), {effect}, draw_runs(0.03, random), random);
+  const TrialCampaign campaign = draw_campaign(read_rig(test::null_campaign("rig.toml")), {effect}, draw_runs(0.03, random), ideal_laboratory(), random);
   const auto problem = std::make_shared<FitProblem>();
   problem->rig = campaign.rig;
   problem->runs = campaign.runs;

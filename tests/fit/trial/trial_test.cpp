@@ -20,7 +20,7 @@ TEST(TrialCampaign, HidesWhatItSaysAndRepeats) {
   const Rig rig = read_rig(test::null_campaign("rig.toml"));
   const auto draw = [&](const std::vector<std::string>& hidden) {
     std::mt19937_64 random(7);
-    return draw_campaign(rig, hidden, draw_runs(0.03, random), random);
+    return draw_campaign(rig, hidden, draw_runs(0.03, random), ideal_laboratory(), random);
   };
   const TrialCampaign null = draw({}), wave = draw({"tank-wave"});
   EXPECT_EQ(null.size, 0);
@@ -38,7 +38,7 @@ TEST(TrialCampaign, GivesTheSizeOfEachOfTwo) {
   const Rig rig = read_rig(test::null_campaign("rig.toml"));
   const auto draw = [&](const std::vector<std::string>& hidden) {
     std::mt19937_64 random(7);
-    return draw_campaign(rig, hidden, draw_runs(0.03, random), random);
+    return draw_campaign(rig, hidden, draw_runs(0.03, random), ideal_laboratory(), random);
   };
   const TrialCampaign hum = draw({"mains-hum"}), both = draw({"cubic-stiffness", "mains-hum"}), modes = draw({"higher-mode", "gauge-drift"});
   ASSERT_EQ(hum.sizes.size(), 1u);
@@ -64,7 +64,7 @@ TEST(TrialCampaign, EveryEffectOfTheTableLeavesATrace) {
       std::mt19937_64 random(seed);
       std::vector<PlannedRun> runs = draw_runs(0.03, random);
       runs.erase(runs.begin() + 2, runs.end() - 1);  // both plucks and the step from 25 degrees
-      const TrialCampaign campaign = draw_campaign(rig, {e.id}, runs, random);
+      const TrialCampaign campaign = draw_campaign(rig, {e.id}, runs, ideal_laboratory(), random);
       ASSERT_EQ(campaign.sizes.size(), 1u) << e.id;
       EXPECT_GT(campaign.sizes.front(), trace) << e.id;
       EXPECT_EQ(campaign.parameters.size(), e.parameters.size()) << e.id;
@@ -82,7 +82,7 @@ TEST(TrialCampaign, RepeatsRecordings) {
   recordings[1].channels[1].value.segment(700, 3).setConstant(NAN);
   std::mt19937_64 random(3);
   const std::vector<PlannedRun> planned = runs_like(rig, recordings, {}, random);
-  const TrialCampaign campaign = draw_campaign(rig, {}, planned, random);
+  const TrialCampaign campaign = draw_campaign(rig, {}, planned, ideal_laboratory(), random);
   ASSERT_EQ(campaign.runs.size(), 3u);
   for (std::size_t r = 0; r < 3; ++r) {
     EXPECT_EQ(campaign.runs[r].samples(), recordings[r].samples());
@@ -118,6 +118,7 @@ TEST(TrialCampaign, RefusesRecordingsThatItCannotRepeat) {
 TEST(Trial, NothingHiddenAndAWave) {
   TrialProblem problem;
   problem.rig = read_rig(test::null_campaign("rig.toml"));
+  problem.ideal = true;
   problem.effects = {"tank-wave"};
   problem.trials = 2;
   problem.seed = 1;
@@ -138,6 +139,7 @@ TEST(Trial, NothingHiddenAndAWave) {
 TEST(Trial, WhatIsHiddenOutsideTheCandidatesCannotBeNamed) {
   TrialProblem problem;
   problem.rig = read_rig(test::null_campaign("rig.toml"));
+  problem.ideal = true;
   problem.effects = {"tank-wave", "gauge-drift"};
   problem.trials = 2;
   problem.outside = true;
@@ -148,6 +150,44 @@ TEST(Trial, WhatIsHiddenOutsideTheCandidatesCannotBeNamed) {
   EXPECT_TRUE(result.outcomes[1].unexplained);
   problem.effects = {"tank-wave"};  // no candidate would be left, and none named means all
   EXPECT_THROW(run_trials(problem), InputError);
+}
+
+TEST(Trial, OfFilesThatAreOffTheRigsDescriptionIsNoFalseName) {
+  TrialOutcome o;
+  o.found = {"rig-description"};
+  EXPECT_FALSE(o.right());
+  EXPECT_TRUE(o.false_name());
+  o.misread = "normal.mass";
+  EXPECT_TRUE(o.right());
+  EXPECT_FALSE(o.false_name());
+  o.hidden = {"tank-wave"};
+  EXPECT_FALSE(o.right());
+  o.found = {"rig-description", "tank-wave"};
+  EXPECT_TRUE(o.right());
+  o.found = {"gauge-drift"};
+  EXPECT_TRUE(o.false_name());
+}
+
+/// Ten names stated with 0.9, of which six are right, and ten with 0.6, of which six are: off by 0.3 and 0, by 0.15 in the mean.
+TEST(Trial, CountsWhetherStatedProbabilitiesHold) {
+  TrialResult result;
+  for (const double stated : {0.9, 0.6})
+    for (int i = 0; i < 10; ++i) {
+      TrialOutcome o;
+      o.hidden = {"tank-wave"};
+      o.found = {i < 6 ? "tank-wave" : "gauge-drift"};
+      o.probability = stated;
+      result.outcomes.push_back(o);
+    }
+  result.outcomes.emplace_back().unexplained = true;  // names nothing, states nothing
+  tally(result);
+  EXPECT_EQ(result.reliability.campaigns, 20);
+  ASSERT_EQ(result.reliability.bins.size(), 2u);
+  EXPECT_NEAR(result.reliability.bins[0].stated, 0.6, 1e-12);
+  EXPECT_EQ(result.reliability.bins[0].right, 6);
+  EXPECT_NEAR(result.reliability.calibration_error, 0.15, 1e-12);
+  EXPECT_NEAR(result.reliability.brier, (0.6 * 0.01 + 0.4 * 0.81 + 0.6 * 0.16 + 0.4 * 0.36) / 2, 1e-12);
+  EXPECT_EQ(result.wrong_names, 8);
 }
 
 TEST(Trial, RefusesARigThatCannotBePitched) {
