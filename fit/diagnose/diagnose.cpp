@@ -426,6 +426,9 @@ Diagnosis diagnose_in_order(const DiagnoseProblem& problem, bool numbers_known) 
   if (time.is_up() && !laws) fit_problem.rig.laws.clear();  // a search that was stopped leaves its forms there
   const Trial& best = found.best;
   d.ranking = selection->ranking();
+  std::vector<std::string> named = best.effects;
+  if (described) named.insert(named.begin(), rig_description_id);
+  if (!named.empty() && (described || naming_of(best, baseline, found.clean(), found.predicts) == Naming::named)) leave_out_what_explains_nothing(named, d.ranking);
   d.remaining = found.remaining;
   d.unexplained = d.mismatch.found && !found.explains();
 

@@ -45,7 +45,7 @@ struct Candidate {
   std::vector<std::string> effects;
   double reduced_chi2 = 0;   ///< of the fitted runs, after the fit
   double delta_bic = 0;      ///< against the fit with nothing missing; negative is better
-  double probability = 0;    ///< exp(-BIC/2) over the sum of it over all sets tried
+  double probability = 0;    ///< exp(-BIC/2) over the sum of it over all sets tried; 0 of one of lower BIC than what is named, which leaves something or predicts worse
   double score = 0;          ///< share of the excess of chi-square that one linear step promised to remove (first round only)
   SearchOutcome search = SearchOutcome::complete;
 };

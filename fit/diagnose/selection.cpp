@@ -28,12 +28,6 @@ constexpr double hardly_less = 0.9;  // of the excess: an effect that leaves so 
 constexpr std::size_t most_refits = 5, most_in_full = 2;
 constexpr std::size_t few = 7;  // candidates that are all worth a fit
 
-bool same_set(Strings a, Strings b) {
-  std::sort(a.begin(), a.end());
-  std::sort(b.begin(), b.end());
-  return a == b;
-}
-
 /// A few rounds for all, the rest for those that are ahead.
 void fit_linear(Trials& trials) {
   in_parallel(trials.size(), [&](std::size_t i) { fit_fully(trials[i], 2); });
@@ -118,6 +112,12 @@ Trial in_finer_steps(Trial trial) {
 }
 
 }  // namespace
+
+bool same_set(Strings a, Strings b) {
+  std::sort(a.begin(), a.end());
+  std::sort(b.begin(), b.end());
+  return a == b;
+}
 
 SearchOutcome search_of(const Trial& trial, const Trial& base) {
   if (trial.ruled_out) return SearchOutcome::ruled_out;
@@ -366,6 +366,15 @@ std::vector<Candidate> Selection::ranking() const {
   for (Candidate& c : ranking) sum += c.probability = std::exp(-0.5 * (c.delta_bic - ranking.front().delta_bic));
   for (Candidate& c : ranking) c.probability /= sum;
   return ranking;
+}
+
+void leave_out_what_explains_nothing(const std::vector<std::string>& named, std::vector<Candidate>& ranking) {
+  const auto winner = std::find_if(ranking.begin(), ranking.end(), [&](const Candidate& c) { return same_set(c.effects, named); });
+  if (winner == ranking.end()) return;
+  std::for_each(ranking.begin(), winner, [](Candidate& c) { c.probability = 0; });
+  double sum = 0;
+  for (auto c = winner; c != ranking.end(); ++c) sum += c->probability = std::exp(-0.5 * (c->delta_bic - winner->delta_bic));
+  for (auto c = winner; c != ranking.end(); ++c) c->probability /= sum;
 }
 
 }  // namespace unrig

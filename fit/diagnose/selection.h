@@ -14,6 +14,9 @@ constexpr double decisive = 10;  ///< BIC: very strong evidence (Kass and Rafter
 /// What a fit leaves (locate_mismatch); of decays that are set aside, what laws leave of them that are trusted to within some per cent.
 Mismatch what_remains(const Trial& trial);
 
+/// Whether two sets have the same effects, in whichever order.
+bool same_set(std::vector<std::string> a, std::vector<std::string> b);
+
 /// How the search ended for a set with one effect more than `base`. An effect without parameters (all the modes of the rig) cannot be taken to nothing: it may leave more.
 SearchOutcome search_of(const Trial& trial, const Trial& base);
 
@@ -57,5 +60,8 @@ class Selection {
   std::vector<Candidate> ranking_;
   bool stopped_ = false;
 };
+
+/// Probabilities of a ranking (the best first) once `named` is the answer: a set of lower BIC that is not named leaves something or predicts worse, and so explains nothing.
+void leave_out_what_explains_nothing(const std::vector<std::string>& named, std::vector<Candidate>& ranking);
 
 }  // namespace unrig

@@ -2,12 +2,14 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
 #include <random>
 #include <string>
 #include <vector>
 
 #include "core/model/simulate.h"
 #include "fit/diagnose/diagnose.h"
+#include "fit/diagnose/selection.h"
 #include "fit/trial/trial_campaign.h"
 #include "tests/support/long_tests.h"
 #include "tests/support/sample_data.h"
@@ -173,6 +175,24 @@ TEST_F(LongSelection, StepsOfARigWithAGapAreFollowedToTheNoise) {
   const Diagnosis d = verdict_on(pair(3902, 5, {"freeplay"}, true), {"freeplay", "coulomb-friction", "wagner-lag"});
   EXPECT_THAT(found_in(d), UnorderedElementsAre("freeplay"));
   EXPECT_FALSE(d.unexplained) << d.remaining.summary;
+}
+
+/// BIC of 2 ln 3 more is a third as probable.
+TEST(Ranking, GivesNothingToWhatWouldHaveWonAndWasNotNamed) {
+  const double third = 2 * std::log(3.0);
+  std::vector<Candidate> ranking(4);
+  ranking[0].effects = {"rig-description"}, ranking[0].delta_bic = -200;
+  ranking[1].effects = {"tank-wave", "mains-hum"}, ranking[1].delta_bic = -100;
+  ranking[2].effects = {"gauge-drift"}, ranking[2].delta_bic = -100 + third;
+  ranking[3].delta_bic = 0;
+  for (Candidate& c : ranking) c.probability = 0.25;
+  std::vector<Candidate> other = ranking;
+  leave_out_what_explains_nothing({"mains-hum", "tank-wave"}, ranking);
+  EXPECT_EQ(ranking[0].probability, 0);
+  EXPECT_NEAR(ranking[1].probability, 0.75, 1e-12);
+  EXPECT_NEAR(ranking[2].probability, 0.25, 1e-12);
+  leave_out_what_explains_nothing({"channel-delay"}, other);
+  EXPECT_EQ(other[0].probability, 0.25) << "as it was: no set of the ranking";
 }
 
 }  // namespace
