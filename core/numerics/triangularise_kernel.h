@@ -6,9 +6,9 @@
 
 namespace {
 
-/// C columns of `length` numbers, less `scale` (reflector . column) times the reflector.
+/// C columns of `length` numbers, less `tau` (reflector . column) times the reflector.
 template <int W, int C>
-[[gnu::always_inline]] inline void reflect_columns(const double* reflector, std::ptrdiff_t length, double scale, double* a, std::ptrdiff_t stride) {
+[[gnu::always_inline]] inline void reflect_columns(const double* reflector, std::ptrdiff_t length, double tau, double* a, std::ptrdiff_t stride) {
   typedef double Vector __attribute__((vector_size(8 * W), aligned(8), may_alias));
   const std::ptrdiff_t whole = length / W * W;
   Vector sums[C] = {};
@@ -21,7 +21,7 @@ template <int W, int C>
     double lanes[W];
     *reinterpret_cast<Vector*>(lanes) = sums[c];
     for (int w = 0; w < W; ++w) dot[c] += lanes[w];
-    dot[c] *= scale;
+    dot[c] *= tau;
   }
   for (std::ptrdiff_t i = 0; i < whole; i += W)
     for (int c = 0; c < C; ++c) *reinterpret_cast<Vector*>(a + c * stride + i) -= dot[c] * *reinterpret_cast<const Vector*>(reflector + i);
@@ -54,14 +54,19 @@ template <int W>
   for (std::ptrdiff_t j = 0; j < pivots && j + 1 < rows; ++j) {
     double* below = a + j * stride + j;
     const std::ptrdiff_t length = rows - j;
+    constexpr double nothing = 1e-290;  // beneath it numbers lose digits; rounding of what cancels, and of the rounding itself, gets there
     const double size = length_of<W>(below, length);
-    if (!(size > 0)) continue;
-    const double end = below[0] > 0 ? -size : size;
-    below[0] -= end;  // the reflector, in the place of what it takes away
-    const double scale = -1 / end / below[0];
+    if (!(size > nothing)) {
+      for (std::ptrdiff_t i = 1; i < length; ++i) below[i] = 0;
+      continue;
+    }
+    // The reflector, in the place of what it takes away, with one in front: then no number is near the square of another.
+    const double end = below[0] > 0 ? -size : size, front = below[0] - end, tau = -front / end;
+    below[0] = 1;
+    for (std::ptrdiff_t i = 1; i < length; ++i) below[i] /= front;
     std::ptrdiff_t k = j + 1;
-    for (; k + 4 <= columns; k += 4) reflect_columns<W, 4>(below, length, scale, a + k * stride + j, stride);
-    for (; k < columns; ++k) reflect_columns<W, 1>(below, length, scale, a + k * stride + j, stride);
+    for (; k + 4 <= columns; k += 4) reflect_columns<W, 4>(below, length, tau, a + k * stride + j, stride);
+    for (; k < columns; ++k) reflect_columns<W, 1>(below, length, tau, a + k * stride + j, stride);
     below[0] = end;
     for (std::ptrdiff_t i = 1; i < length; ++i) below[i] = 0;
   }

@@ -42,11 +42,19 @@ TEST(Triangularise, WorksInPlaceOnAPartOfAMatrix) {
 }
 
 TEST(Triangularise, LosesNothingOfSquaresNearTheEndsOfTheRange) {
-  for (const double size : {1e-145, 1e145}) {
+  for (const double size : {1e-250, 1e-145, 1e145}) {
     MatrixXd large = any(9, 6), scaled = size * large;
     triangularise(large, 6);
     triangularise(scaled, 6);
     EXPECT_LT((scaled / size - large).norm(), 1e-13 * large.norm()) << size;
+  }
+  // Of rank one: what is left is rounding, of which the next column leaves rounding, down to the smallest numbers.
+  for (const Index columns : {12, 47}) {
+    MatrixXd rank_one = any(columns, 1) * any(1, columns);
+    const double length = rank_one.norm();
+    triangularise(rank_one, columns);
+    ASSERT_TRUE(rank_one.allFinite());
+    EXPECT_LT(rank_one.bottomRows(columns - 1).norm(), 1e-14 * length);
   }
   MatrixXd none = MatrixXd::Zero(5, 3);
   triangularise(none, 3);
