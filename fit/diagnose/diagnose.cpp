@@ -4,6 +4,7 @@
 #include <chrono>
 #include <cmath>
 #include <functional>
+#include <iterator>
 #include <memory>
 #include <set>
 
@@ -295,6 +296,7 @@ bool weigh(const DiagnoseProblem& problem, const Setting& files, const Trial& ba
 /// What a search for laws came to.
 struct Laws {
   std::vector<Trial> tried;  ///< the best first, which is what was found
+  std::vector<Rival> rivals;
   Reach reach;
 };
 
@@ -331,7 +333,11 @@ std::optional<Laws> look_for_laws(const DiagnoseProblem& problem, FitProblem& fi
   if (!found.best.effects.empty()) look_beside(found.best);
   std::stable_sort(laws.tried.begin(), laws.tried.end(), [](const Trial& a, const Trial& b) { return bic_difference(a, b) < 0; });
   fit_problem.rig.laws.clear();
-  while (!laws.tried.empty() && is_undetermined(fit_problem, laws.tried.front())) laws.tried.erase(laws.tried.begin());
+  std::vector<Trial> undetermined;  // no answers, but not refuted either
+  while (!laws.tried.empty() && is_undetermined(fit_problem, laws.tried.front())) {
+    undetermined.push_back(std::move(laws.tried.front()));
+    laws.tried.erase(laws.tried.begin());
+  }
   if (laws.tried.empty()) return std::nullopt;
   const auto rest = std::stable_partition(laws.tried.begin(), laws.tried.end(), [](const Trial& t) { return !leaves_something(t); });
   const auto last = rest == laws.tried.begin() ? laws.tried.end() : rest;
@@ -345,16 +351,17 @@ std::optional<Laws> look_for_laws(const DiagnoseProblem& problem, FitProblem& fi
     return std::nullopt;
   }
   found = std::move(with);
+  laws.tried.insert(laws.tried.begin() + 1, std::make_move_iterator(undetermined.begin()), std::make_move_iterator(undetermined.end()));
+  laws.rivals = rivals(laws.tried, leaves_something, decisive);
   return laws;
 }
 
 /// Laws among `set`, told as such; the rig keeps only those at work.
 void tell_laws(FitProblem& fit_problem, const Laws& laws, const FoundSet& found, std::vector<MissingEffect>& set, Diagnosis& d) {
-  const std::vector<Rival> others = rivals(laws.tried, leaves_something, decisive);
   for (MissingEffect& m : set)
     if (is_law_id(m.effect)) {
       m.law = found_law(fit_problem.rig, m.effect, found.fit, laws.reach);
-      if (m.effect == found.best.effects.back()) m.law->rivals = others;
+      if (m.effect == found.best.effects.back()) m.law->rivals = laws.rivals;
     }
   std::erase_if(fit_problem.rig.laws, [&](const auto& law) { return std::find(found.best.effects.begin(), found.best.effects.end(), law->id) == found.best.effects.end(); });
   d.laws = fit_problem.rig.laws;
@@ -428,9 +435,6 @@ Diagnosis diagnose_in_order(const DiagnoseProblem& problem, bool numbers_known) 
   if (time.is_up() && !laws) fit_problem.rig.laws.clear();  // a search that was stopped leaves its forms there
   const Trial& best = found.best;
   d.ranking = selection->ranking();
-  std::vector<std::string> named = best.effects;
-  if (described) named.insert(named.begin(), rig_description_id);
-  if (!named.empty() && (described || naming_of(best, baseline, found.clean(), found.predicts) == Naming::named)) leave_out_what_explains_nothing(named, d.ranking);
   d.remaining = found.remaining;
   d.unexplained = d.mismatch.found && !found.explains();
 
@@ -445,11 +449,19 @@ Diagnosis diagnose_in_order(const DiagnoseProblem& problem, bool numbers_known) 
     if (d.unexplained) d.missing_force = missing_forces(best.arrival.joint);
   }
   if (!d.not_followed.empty()) d.search = SearchOutcome::failed;
+  if (!described && !best.effects.empty()) d.naming = naming_of(best, baseline, found.clean(), found.predicts);
+  if ((described || !best.effects.empty()) && d.naming == Naming::named) {
+    name_equivalent(found, described, selection->tried(), problem.verdict_only, d);
+    std::vector<std::vector<std::string>> unrefuted = d.equivalent;
+    if (laws)
+      for (const Rival& r : laws->rivals) unrefuted.push_back(r.effects);
+    unrefuted.push_back(best.effects);
+    if (described) unrefuted.back().push_back(rig_description_id);
+    leave_out_what_explains_nothing(unrefuted.back(), unrefuted, d.ranking);
+  }
   if (described) d.missing.push_back(missing_description(*description, found, fit_problem, d));
-  if (described || !best.effects.empty()) {
-    if (!described) d.naming = naming_of(best, baseline, found.clean(), found.predicts);
-    if (d.naming == Naming::named) name_equivalent(found, described, selection->tried(), problem.verdict_only, d);
-    else d.removed_by_closest = 1 - best.excess() / baseline.excess();
+  if (!best.effects.empty()) {
+    if (d.naming != Naming::named) d.removed_by_closest = 1 - best.excess() / baseline.excess();
     std::vector<MissingEffect>& set = d.naming == Naming::named ? d.missing : d.closest;
     for (MissingEffect& m : effects_of(found, fit_problem.rig, d)) set.push_back(std::move(m));
     if (laws) tell_laws(fit_problem, *laws, found, set, d);

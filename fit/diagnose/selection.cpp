@@ -368,13 +368,13 @@ std::vector<Candidate> Selection::ranking() const {
   return ranking;
 }
 
-void leave_out_what_explains_nothing(const std::vector<std::string>& named, std::vector<Candidate>& ranking) {
+void leave_out_what_explains_nothing(const Strings& named, const std::vector<Strings>& unrefuted, std::vector<Candidate>& ranking) {
   const auto winner = std::find_if(ranking.begin(), ranking.end(), [&](const Candidate& c) { return same_set(c.effects, named); });
   if (winner == ranking.end()) return;
-  std::for_each(ranking.begin(), winner, [](Candidate& c) { c.probability = 0; });
+  const auto explains = [&](const Candidate& c) { return std::any_of(unrefuted.begin(), unrefuted.end(), [&](const Strings& set) { return same_set(c.effects, set); }); };
   double sum = 0;
-  for (auto c = winner; c != ranking.end(); ++c) sum += c->probability = std::exp(-0.5 * (c->delta_bic - winner->delta_bic));
-  for (auto c = winner; c != ranking.end(); ++c) c->probability /= sum;
+  for (auto c = ranking.begin(); c != ranking.end(); ++c) sum += c->probability = c >= winner || explains(*c) ? std::exp(-0.5 * (c->delta_bic - winner->delta_bic)) : 0;
+  for (Candidate& c : ranking) c.probability /= sum;
 }
 
 }  // namespace unrig

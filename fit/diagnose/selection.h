@@ -61,7 +61,7 @@ class Selection {
   bool stopped_ = false;
 };
 
-/// Probabilities of a ranking (the best first) once `named` is the answer: a set of lower BIC that is not named leaves something or predicts worse, and so explains nothing.
-void leave_out_what_explains_nothing(const std::vector<std::string>& named, std::vector<Candidate>& ranking);
+/// Probabilities of a ranking (the best first) once `named` is the answer: a set of lower BIC that is neither named nor `unrefuted` leaves something or predicts worse, and so explains nothing.
+void leave_out_what_explains_nothing(const std::vector<std::string>& named, const std::vector<std::vector<std::string>>& unrefuted, std::vector<Candidate>& ranking);
 
 }  // namespace unrig

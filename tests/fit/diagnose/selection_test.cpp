@@ -187,12 +187,16 @@ TEST(Ranking, GivesNothingToWhatWouldHaveWonAndWasNotNamed) {
   ranking[3].delta_bic = 0;
   for (Candidate& c : ranking) c.probability = 0.25;
   std::vector<Candidate> other = ranking;
-  leave_out_what_explains_nothing({"mains-hum", "tank-wave"}, ranking);
+  leave_out_what_explains_nothing({"mains-hum", "tank-wave"}, {}, ranking);
   EXPECT_EQ(ranking[0].probability, 0);
   EXPECT_NEAR(ranking[1].probability, 0.75, 1e-12);
   EXPECT_NEAR(ranking[2].probability, 0.25, 1e-12);
-  leave_out_what_explains_nothing({"channel-delay"}, other);
+  leave_out_what_explains_nothing({"channel-delay"}, {}, other);
   EXPECT_EQ(other[0].probability, 0.25) << "as it was: no set of the ranking";
+  leave_out_what_explains_nothing({"gauge-drift"}, {{"tank-wave", "mains-hum"}}, other);
+  EXPECT_EQ(other[0].probability, 0);
+  EXPECT_NEAR(other[1].probability, 0.75, 1e-12) << "a rival that these runs do not refute";
+  EXPECT_NEAR(other[2].probability, 0.25, 1e-12);
 }
 
 }  // namespace
