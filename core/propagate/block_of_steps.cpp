@@ -14,7 +14,7 @@ using Eigen::MatrixXd;
 Index BlockOfSteps::best_length(const StepMatrices& one) {
   // Least of L/2 changes on what is seen and the states once in L steps.
   const auto changes = static_cast<double>(one.feedbacks * (one.arguments + one.channels)), states = static_cast<double>(one.states * one.jerk());
-  return std::max<Index>(1, std::lround(std::sqrt(2 * states / changes)));
+  return std::max<Index>(1, std::lround(std::sqrt(2 * states / std::max(1.0, changes))));
 }
 
 BlockOfSteps::BlockOfSteps(const StepMatrices& one, Index steps, bool jerks)
