@@ -12,6 +12,7 @@ import pathlib
 import sys
 
 VISIBLE = 3  # sizes from here on count
+STATED = [0, 0.5, 0.8, 0.9, 0.95, 0.99, 1]
 BINS = [0, 0.3, 1, 3, 10, 30, 100, float("inf")]
 
 
@@ -72,6 +73,20 @@ def main():
         count = collections.Counter(kind(t) for t in seen)
         wrong = sorted({" + ".join(sorted(t["found"])) for t in seen if kind(t) == "wrong"})
         print(f"| {name} | {len(own)} | {len(seen)} | " + " | ".join(str(count[c]) for c in columns) + f" | {nine_in_ten(own)} | {', '.join(wrong)} |")
+    for what, of in (("noise", lambda t: t["noise"]), ("files", lambda t: f"{t['misread'].split('.')[0]} off" if t["misread"] else "exact")):
+        print(f"\n| {what} | campaigns | size {VISIBLE} or more | " + " | ".join(columns) + " |\n" + "| --- " * (len(columns) + 3) + "|")
+        for name in sorted({of(t) for t in hidden}):
+            own = [t for t in hidden if of(t) == name]
+            count = collections.Counter(kind(t) for t in own if size(t) >= VISIBLE)
+            print(f"| {name} | {len(own)} | {sum(count.values())} | " + " | ".join(str(count[c]) for c in columns) + " |")
+    stated = sorted((t["probability"], t["right"]) for t in trials if t["probability"] is not None)
+    if stated:
+        print("\n| stated probability | campaigns | in the mean | right |\n| --- | --- | --- | --- |")
+        for low, high in zip(STATED, STATED[1:]):
+            own = [(p, right) for p, right in stated if low <= p < high or p == high == 1]
+            if own:
+                print(f"| {low:g} to {high:g} | {len(own)} | {sum(p for p, _ in own) / len(own):.3f} | {sum(right for _, right in own)} |")
+        print(f"\nBrier score {sum((p - right) ** 2 for p, right in stated) / len(stated):.3f}.")
     print("\n| size | campaigns | " + " | ".join(columns) + " |\n" + "| --- " * (len(columns) + 2) + "|")
     for low, high in zip(BINS, BINS[1:]):
         own = [t for t in hidden if low <= size(t) < high]

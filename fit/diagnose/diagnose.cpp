@@ -278,15 +278,13 @@ FoundSet laws_beside(const RigDescription& description, const DiagnoseProblem& p
   return with;
 }
 
-/// The rig's description against the laws that were `found`: with laws `beside` it, as far as these were looked for, where it leaves little enough to be named beside them and more than one law was needed without
-/// it, or neither explains everything. True where it is the better explanation, then in `found`.
+/// The rig's description against the laws that were `found`: with laws `beside` it, as far as these were looked for, where neither explains everything. True where it is the better explanation, then in `found`.
 bool weigh(const DiagnoseProblem& problem, const Setting& files, const Trial& baseline, const RigDescription& description, std::optional<FoundSet> beside, Selection& selection, SearchTime& time, FoundSet& found) {
   const double against_baseline = bic_difference(description.trial, baseline) + description.cost;
   selection.add({{rig_description_id}, description.trial.reduced_chi2(), against_baseline, 0, description.promised});
   if (found.explains() && against_baseline > -decisive) return false;
   FoundSet with = beside ? std::move(*beside) : look_at(problem, files, baseline, {description.problem.get(), &description.heldout}, description.trial, description.cost);
-  const bool nearly = found.best.effects.size() > 1 && description.trial.excess() < (1 - enough_to_name) * baseline.excess();
-  if (!with.explains() && (nearly || !found.explains()) && !beside) time.spend([&] { with = laws_beside(description, problem, files, baseline, selection); });
+  if (!with.explains() && !found.explains() && !beside) time.spend([&] { with = laws_beside(description, problem, files, baseline, selection); });
   const bool laws_named = !found.best.effects.empty() && naming_of(found.best, baseline, found.clean(), found.predicts) == Naming::named;
   if (!with.explains() || (laws_named && bic_difference(found.best, with.best) - with.cost < -decisive)) return false;
   found = std::move(with);
