@@ -56,7 +56,7 @@ void BlockOfSteps::begin(Work& work) const {
 
 void BlockOfSteps::add_changes(Work& work, Index k) const {
   auto seen = work.seen.middleCols(k * per_step(), per_step());
-  if (k > 0) {
+  if (k > 0 && changes_ > 0) {
     small_product(work.changes.col(states_ + forces_).data(), work.changes.rows(), k * changes_, change_seen_.data() + (steps_ - k) * changes_, change_seen_.rows(), per_step(), work.room.data(), work.room.rows());
     seen += work.room.leftCols(per_step());
   }

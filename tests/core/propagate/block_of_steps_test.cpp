@@ -11,8 +11,10 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-/// A stable system of any matrices, two laws that see three arguments, two channels.
+/// A stable system of any matrices, two laws that see three arguments (or none), two channels.
 struct Stepped {
+  explicit Stepped(bool laws) : with_laws(laws) {}
+  bool with_laws;
   std::mt19937 random{7};
   StepMatrices one = matrices();
   MatrixXd any(Index rows, Index columns) {
@@ -20,16 +22,19 @@ struct Stepped {
     return MatrixXd::NullaryExpr(rows, columns, [&] { return normal(random); });
   }
   StepMatrices matrices() {
-    constexpr Index n = 5, laws = 2, arguments = 3, channels = 2;
+    constexpr Index n = 5, arguments = 3, channels = 2;
+    const Index laws = with_laws ? 2 : 0;
     LinearSystem system;
     system.A = DualMatrix(any(n, n) - 4 * MatrixXd::Identity(n, n));
     system.B = DualMatrix(any(n, laws));
     system.C = DualMatrix(any(channels, n));
     system.D = DualMatrix(any(channels, laws));
     system.motion = 0;
-    system.feedback.resize(laws);
-    system.feedback[0].sees = any(1, n);
-    system.feedback[1].sees = any(arguments - 1, n);
+    if (with_laws) {
+      system.feedback.resize(2);
+      system.feedback[0].sees = any(1, n);
+      system.feedback[1].sees = any(arguments - 1, n);
+    }
     ExactStep step;
     step.transition = DualMatrix(0.2 * any(n, n));
     step.jerk = DualMatrix(any(n, 1));
@@ -39,9 +44,12 @@ struct Stepped {
   }
 };
 
+class BlockOfStepsWithLaws : public testing::TestWithParam<bool> {};
+INSTANTIATE_TEST_SUITE_P(Or, BlockOfStepsWithLaws, testing::Bool());
+
 /// The changes of the forces are given here: what the laws make of what they see is not the block's affair.
-TEST(BlockOfSteps, IsTheRecursionOfItsSteps) {
-  Stepped stepped;
+TEST_P(BlockOfStepsWithLaws, IsTheRecursionOfItsSteps) {
+  Stepped stepped(GetParam());
   const StepMatrices& one = stepped.one;
   constexpr Index directions = 6;
   for (const Index steps : {1, 2, 7})
