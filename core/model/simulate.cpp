@@ -166,7 +166,8 @@ MatrixXd response_of(const SimulateProblem& problem, const LinearSystem& system,
   const MatrixXd input = inputs_of(run, conditions);
   const VectorXd start = start_of(problem, system, motion);
   const ExactStep step = step_to_follow(system, run.dt);
-  if (problem.signal_steps.size() > 0 && !jumps) return response_with_steps(problem, system, step, start, motion.jerk, input);
+  if (jumps && problem.signal_steps.size() > 0) throw std::invalid_argument("signals that step, and a shaft that jumps");
+  if (problem.signal_steps.size() > 0) return response_with_steps(problem, system, step, start, motion.jerk, input);
   if (!system.feedback.empty()) {
     const NonlinearResponse response = follow(system, step, problem.theta, {start, motion.jerk, input, MatrixXd(system.states(), 0), {}}, run.samples(), Partials::none);
     if (!response.finite) throw NoAnswer(run.file + ": the response with its nonlinear effects grows beyond all bounds");

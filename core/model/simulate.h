@@ -24,7 +24,7 @@ struct SimulateProblem {
   std::optional<double> release_load;         ///< N at the calibration element, let go at the first sample (a pluck starts so)
   std::optional<double> steady_normal_force;  ///< coefficient before the motion; without it, slope times the first angle
   Eigen::VectorXd signals = {};  ///< initial values of the effects' signals (LinearSystem::exogenous), in their units; empty: all zero
-  Eigen::MatrixXd signal_steps = {};  ///< what they change by behind each sample, beside what the model makes of them, samples x signals; empty: nothing
+  Eigen::MatrixXd signal_steps = {};  ///< what they change by behind each sample, beside what the model makes of them, samples x signals; empty: nothing; not with jumps
 };
 
 struct SimulateResult {

@@ -29,7 +29,7 @@ template <int W, int C>
     for (int c = 0; c < C; ++c) a[c * stride + i] -= dot[c] * reflector[i];
 }
 
-/// Without overflow.
+/// Without overflow; NaN where there is one.
 template <int W>
 [[gnu::always_inline]] inline double length_of(const double* a, std::ptrdiff_t length) {
   typedef double Vector __attribute__((vector_size(8 * W), aligned(8), may_alias));
@@ -44,7 +44,7 @@ template <int W>
   if (squares > small && squares < large) return std::sqrt(squares);
   double largest = 0, scaled = 0;
   for (std::ptrdiff_t i = 0; i < length; ++i) largest = std::fmax(largest, std::fabs(a[i]));
-  if (!(largest > 0)) return 0;
+  if (!(largest > 0)) return squares;
   for (std::ptrdiff_t i = 0; i < length; ++i) scaled += a[i] / largest * (a[i] / largest);
   return largest * std::sqrt(scaled);
 }
@@ -56,7 +56,7 @@ template <int W>
     const std::ptrdiff_t length = rows - j;
     constexpr double nothing = 1e-290;  // beneath it numbers lose digits; rounding of what cancels, and of the rounding itself, gets there
     const double size = length_of<W>(below, length);
-    if (!(size > nothing)) {
+    if (size <= nothing) {
       for (std::ptrdiff_t i = 1; i < length; ++i) below[i] = 0;
       continue;
     }

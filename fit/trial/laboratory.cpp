@@ -22,11 +22,6 @@ using Random = std::mt19937_64;
 
 constexpr std::array kinds{std::pair{NoiseKind::white, "white"}, std::pair{NoiseKind::first_order, "first-order"}, std::pair{NoiseKind::pink, "pink"}, std::pair{NoiseKind::heavy_tailed, "heavy-tailed"}, std::pair{NoiseKind::quantised, "quantised"}};
 
-VectorXd white_noise(Index samples, Random& random) {
-  std::normal_distribution<double> normal;
-  return VectorXd::NullaryExpr(samples, [&] { return normal(random); });
-}
-
 /// A first-order autoregression in its steady state.
 VectorXd first_order_noise(Index samples, double corner, double dt, Random& random) {
   VectorXd noise = white_noise(samples, random);
@@ -70,6 +65,11 @@ File read_with_errors(File file, const std::string& group, Deviation deviation) 
 }
 
 }  // namespace
+
+VectorXd white_noise(Index samples, Random& random) {
+  std::normal_distribution<double> normal;
+  return VectorXd::NullaryExpr(samples, [&] { return normal(random); });
+}
 
 std::string to_string(NoiseKind kind) {
   return std::find_if(kinds.begin(), kinds.end(), [&](const auto& k) { return k.first == kind; })->second;

@@ -15,7 +15,7 @@ namespace unrig {
 /// | --- | --- |
 /// | white | - |
 /// | first-order | corner of 1 to 30 Hz: amplifiers |
-/// | pink | 1/f from a fifth of a period in the record to the Nyquist frequency: bridges, temperature; octave by octave a first-order part |
+/// | pink | 1/f from a fifth of a period in the record to the Nyquist frequency: bridges, temperature; of first-order parts, three to an octave |
 /// | heavy-tailed | Student's t of three degrees of freedom: contacts, radio |
 /// | quantised | white, read by a converter in steps of 1 to 6 standard deviations |
 enum class NoiseKind { white, first_order, pink, heavy_tailed, quantised };
@@ -36,6 +36,9 @@ inline Laboratory ideal_laboratory() { return {}; }
 
 /// Each kind of noise as often as the others; in half of the campaigns one group of numbers is misread, each as often as the others; a phase walk of 0.05 to 0.5 rad/s^(1/2).
 Laboratory draw_laboratory(const Rig& rig, const std::vector<Run>& runs, std::mt19937_64& random);
+
+/// White noise of variance 1.
+Eigen::VectorXd white_noise(Eigen::Index samples, std::mt19937_64& random);
 
 /// Noise of variance 1, before the converter; without mean. `dt`: s.
 Eigen::VectorXd draw_noise(const Laboratory& laboratory, Eigen::Index samples, double dt, std::mt19937_64& random);

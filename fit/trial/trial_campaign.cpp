@@ -69,11 +69,6 @@ double apart(const Run& with, const Run& without, const Rig& rig, const PlannedR
   return most;
 }
 
-VectorXd white_noise(Index samples, Random& random) {
-  std::normal_distribution<double> normal;
-  return VectorXd::NullaryExpr(samples, [&] { return normal(random); });
-}
-
 /// The rig with one of the hidden effects at work, and what it is told from.
 struct Alone {
   AeroelasticModel known, with;

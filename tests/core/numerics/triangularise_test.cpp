@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <random>
 
 namespace unrig {
@@ -59,6 +60,10 @@ TEST(Triangularise, LosesNothingOfSquaresNearTheEndsOfTheRange) {
   MatrixXd none = MatrixXd::Zero(5, 3);
   triangularise(none, 3);
   EXPECT_TRUE(none.isZero(0));
+  MatrixXd unknown = any(5, 3);
+  unknown(2, 0) = NAN;
+  triangularise(unknown, 3);
+  EXPECT_TRUE(unknown.row(0).array().isNaN().all()) << "what is not known does not turn into a number";
 }
 
 }  // namespace
