@@ -66,7 +66,7 @@ struct Effect {
   /// Of a nonlinear effect whose starts depend on the size of the response: from the largest argument that its law sees in the runs.
   std::function<std::vector<Eigen::VectorXd>(const AeroelasticModel&, double largest_argument)> starts_for;
   /// Of an effect that shows as a line in the spectrum: its frequency [Hz] in a run, for its parameters. A search then follows the lines of the residual's spectrum
-  /// through the bands of the first parameter, in place of `starts`. Only on rigs on which it has parameters.
+  /// through the bands of the first parameter; `starts` say from which further parameters. Only on rigs on which it has parameters.
   std::function<double(const AeroelasticModel&, const Conditions&, const Eigen::VectorXd& parameters)> frequency;
   /// Whether it can act at all in a run under these conditions.
   std::function<bool(const Rig&, const Conditions&)> acts;

@@ -30,6 +30,7 @@ constexpr std::size_t few = 7;  // candidates that are all worth a fit
 
 /// A few rounds for all, the rest for those that are ahead.
 void fit_linear(Trials& trials) {
+  in_parallel(trials.size(), [&](std::size_t i) { hold_undetermined(trials[i]); });
   in_parallel(trials.size(), [&](std::size_t i) { fit_fully(trials[i], 2); });
   std::sort(trials.begin(), trials.end(), [](const Trial& a, const Trial& b) { return a.reduced_chi2() < b.reduced_chi2(); });
   in_parallel(std::min(trials.size(), most_in_full), [&](std::size_t i) { fit_fully(trials[i], 6); });
@@ -40,6 +41,7 @@ void fit_nonlinear(const Tell& tell, Trials& trials, const Trial& base, Trials& 
   double least = base.reduced_chi2();
   for (Trial& trial : trials) {
     if (tell) tell(fmt::format("trying {}", fmt::join(trial.effects, " with ")));
+    hold_undetermined(trial);
     follow_nonlinear(trial, base, least);
     least = std::min(least, trial.reduced_chi2());
     fitted.push_back(std::move(trial));
@@ -156,11 +158,12 @@ Strings Selection::candidates(const Strings& at_work, const Strings& hopeless) c
 /// The best of all sets that have one effect more than `base`: all of them by one linear step, the promising ones in full.
 Trials Selection::try_one_more(const Trial& base, const Strings& hopeless) {
   const Strings ids = candidates(base.effects, hopeless);
+  const Screening screening(fit_problem_, base.arrival);
   std::vector<std::unique_ptr<Trial>> prepared(ids.size());
   in_parallel(ids.size(), [&](std::size_t i) {
     Strings set = base.effects;
     set.push_back(ids[i]);
-    prepared[i] = std::make_unique<Trial>(prepare(fit_problem_, base, set));
+    prepared[i] = std::make_unique<Trial>(screened(fit_problem_, screening, base, set));
   });
   std::sort(prepared.begin(), prepared.end(), [](const auto& a, const auto& b) { return a->score > b->score; });
   const double best_score = prepared.empty() ? 0 : prepared.front()->score;
@@ -246,21 +249,22 @@ Trials Selection::rivals(const Trial& best, const std::string& member) {
   // chi-square: with the member, as it is without, and where a step without it ends; the first step may lead astray.
   const double with_it = best.arrival.joint.chi2(), now = others.arrival.joint.chi2(), without = std::min(now, (1 - others.score) * with_it);
   const Strings ids = candidates(best.effects, {});
+  const Screening screening(fit_problem_, others.arrival);
   std::vector<std::optional<Trial>> prepared(ids.size());
   in_parallel(ids.size(), [&](std::size_t i) {
     Strings set = fewer;
     set.push_back(ids[i]);
     if (is_fitted(set)) return;
-    Trial trial = prepare(fit_problem_, others, set);
+    Trial trial = screened(fit_problem_, screening, others, set);
     if (brings_a_law(trial) && others.reduced_chi2() > nearly_explained) return;  // too large a mismatch for two laws to explain alike
-    const double promise = brings_a_law(trial) ? faint_promise(trial, others) : trial.score;
-    if (without - (1 - promise) * now > half_way * (without - with_it)) prepared[i] = std::move(trial);
+    if (without - (1 - trial.score) * now > half_way * (without - with_it)) prepared[i] = std::move(trial);
   });
   Trials rivals;
   for (std::optional<Trial>& trial : prepared)
     if (trial) rivals.push_back(std::move(*trial));
   in_parallel(rivals.size(), [&](std::size_t i) {
     Trial& rival = rivals[i];
+    hold_undetermined(rival);
     if (!brings_a_law(rival)) fit_fully(rival, 2);
     else if (!follow_nonlinear(rival, others, others.reduced_chi2())) return;
     if (leaves_nothing(rival) && !decays_decide(rival)) leave_out_terms(rival);

@@ -70,11 +70,12 @@ std::vector<Trial> LawSearch::one_more(const Trial& base) {
   for (const Effect& e : effects())
     if (!e.only_if_named.empty() && is_among(kinds, e.kind) && !is_among(base.effects, e.id) && why_idle(e, problem_.rig, conditions).empty()) added.push_back(e.id);
 
+  const Screening screening(problem_, base.arrival);
   std::vector<std::unique_ptr<Trial>> tried(added.size());
   in_parallel(tried.size(), [&](std::size_t i) {
     std::vector<std::string> set = base.effects;
     set.push_back(added[i]);
-    tried[i] = std::make_unique<Trial>(prepare(problem_, base, set));
+    tried[i] = std::make_unique<Trial>(prepare(problem_, screening, base, set));
     if (by_decays && nonlinear(*tried[i])) tried[i]->ruled_out = !fit_decays_first(*tried[i], base, true);
   });
   // Of thousands of samples twice the excess of another is beyond any evidence.

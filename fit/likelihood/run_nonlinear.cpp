@@ -324,7 +324,7 @@ bool RunResidual::takes_small_steps(const VectorXd& theta) const {
 RunResidual::SideBySide RunResidual::side_by_side(const VectorXd& theta, const VectorXd& linear, Index samples, Partials partials) const {
   samples = std::min(samples, last_sample_);
   const bool slopes = partials == Partials::all;
-  LinearSystem system = slopes ? differentiable_system(theta) : searched_system(theta);
+  LinearSystem system = slopes ? differentiable_system(theta, differentiated_) : searched_system(theta);
   if (!slopes)
     for (DualMatrix* m : {&system.A, &system.B, &system.C, &system.D}) m->partial.clear();
   const Index n = system.states(), states = static_cast<Index>(free_.size()), channels = measured_.cols(), parameters = static_cast<Index>(model_->parameters().size());

@@ -94,6 +94,9 @@ class RunResidual {
   };
   Prediction predict(const Eigen::VectorXd& theta) const;
 
+  /// The run to first order, for models with further laws (fit/likelihood/run_first_order.h).
+  class FirstOrder;
+
   /// The largest argument that the law of each nonlinear effect sees at theta; empty for a linear model, zero where the model runs away.
   Eigen::VectorXd largest_arguments(const Eigen::VectorXd& theta) const;
 
@@ -271,7 +274,7 @@ class RunResidual {
   void follow_nonlinear_partials(const LinearSystem& system, const Eigen::VectorXd& theta, const Eigen::VectorXd& linear, const TakeRows& take) const;
   Eigen::MatrixXd jerk_slope(const Interval& samples) const;
   LinearSystem searched_system(const Eigen::VectorXd& theta) const;
-  LinearSystem differentiable_system(const Eigen::VectorXd& theta) const;
+  LinearSystem differentiable_system(const Eigen::VectorXd& theta, const std::vector<Eigen::Index>& parameters) const;
   Eigen::MatrixXd motion_state_columns(const Linearised& lin, const Interval& samples) const;
   Eigen::MatrixXd state_behind(const Linearised& lin, const MotionBasis::Phase& phase, const Interval& samples, const Eigen::MatrixXd& start) const;
   Eigen::Index smooth_from(const Linearised& lin, const Interval& samples, const Eigen::MatrixXd& start) const;

@@ -280,12 +280,13 @@ LinearSystem RunResidual::searched_system(const VectorXd& theta) const {
   return system;
 }
 
-LinearSystem RunResidual::differentiable_system(const VectorXd& theta) const {
+/// With the partials of these parameters alone; none: of all.
+LinearSystem RunResidual::differentiable_system(const VectorXd& theta, const std::vector<Index>& parameters) const {
   LinearSystem system = searched_system(theta);
-  if (differentiated_.empty()) return system;
+  if (parameters.empty()) return system;
   for (DualMatrix* m : {&system.A, &system.B, &system.C, &system.D})
     for (Index j = 0; j < m->parameters(); ++j)
-      if (std::find(differentiated_.begin(), differentiated_.end(), j) == differentiated_.end()) m->partial[static_cast<std::size_t>(j)].resize(0, 0);
+      if (std::find(parameters.begin(), parameters.end(), j) == parameters.end()) m->partial[static_cast<std::size_t>(j)].resize(0, 0);
   return system;
 }
 
@@ -323,7 +324,7 @@ DualMatrix RunResidual::follow_partials(const VectorXd& theta, const VectorXd& l
     at = shared_->slopes;
   }
   if (!at || at->theta != theta || at->differentiated != differentiated_) {
-    LinearSystem system = differentiable_system(theta);
+    LinearSystem system = differentiable_system(theta, differentiated_);
     if (!system.feedback.empty()) {
       follow_nonlinear_partials(system, theta, linear, take);
       return {};

@@ -1,5 +1,4 @@
 #include "fit/search/arrival.h"
-#include "fit/search/decays_first.h"
 
 #include <algorithm>
 #include <cmath>
@@ -10,9 +9,8 @@
 #include <fmt/format.h>
 
 #include "core/effects/effect.h"
-#include "core/numerics/in_parallel.h"
 #include "core/law/law_effect.h"
-#include "core/numerics/spectrum.h"
+#include "core/numerics/in_parallel.h"
 #include "fit/search/first_guess.h"
 #include "fit/search/modal_start.h"
 #include "fit/search/mode_order.h"
@@ -24,6 +22,24 @@ namespace unrig {
 bool belongs_to_an_effect(const std::string& parameter) {
   return is_law_id(parameter) || std::any_of(effects().begin(), effects().end(), [&](const Effect& e) { return parameter.starts_with(e.id + "."); });
 }
+
+JointProblem make_joint(const AeroelasticModel& model, const std::vector<Run>& runs, const std::vector<std::vector<MotionBasis::Window>>& windows, Eigen::Index horizon) {
+  std::vector<RunResidual> residuals;
+  for (std::size_t r = 0; r < runs.size(); ++r) residuals.emplace_back(model, runs[r], windows[r], RunOptions{horizon});
+  return JointProblem(model, std::move(residuals));
+}
+
+void set_starts(JointProblem& joint, const std::map<std::string, double>& starts) {
+  for (Unknown& u : joint.unknowns())
+    if (const auto found = starts.find(joint.parameter(u).name); found != starts.end()) {
+      const Parameter& p = joint.parameter(u);
+      const auto [lower, upper] = bounds_at(joint.model(), u.parameter, found->second);
+      if (!(found->second >= lower && found->second <= upper))
+        throw InputError({"--start", 0}, fmt::format("{}={:g}", p.name, found->second), fmt::format("wanted a value from {:g} to {:g}", lower, upper), "");
+      u.value = found->second;
+    }
+}
+
 namespace {
 
 using Eigen::Index;
@@ -32,12 +48,6 @@ using Windows = std::vector<std::vector<MotionBasis::Window>>;
 
 void tell(const FitProblem& problem, const std::string& what) {
   if (problem.progress) problem.progress(what);
-}
-
-JointProblem make_joint(const AeroelasticModel& model, const std::vector<Run>& runs, const Windows& windows, Index horizon) {
-  std::vector<RunResidual> residuals;
-  for (std::size_t r = 0; r < runs.size(); ++r) residuals.emplace_back(model, runs[r], windows[r], RunOptions{horizon});
-  return JointProblem(model, std::move(residuals));
 }
 
 /// Continues `next` from the values of `last`.
@@ -157,176 +167,12 @@ Arrival arrive_at_modes(const Arrival& start, const FitProblem& problem, const A
   return grown.joint.chi2() < best->joint.chi2() ? grown : *best;
 }
 
-void set_starts(JointProblem& joint, const std::map<std::string, double>& starts) {
-  for (Unknown& u : joint.unknowns())
-    if (const auto found = starts.find(joint.parameter(u).name); found != starts.end()) {
-      const Parameter& p = joint.parameter(u);
-      const auto [lower, upper] = bounds_at(joint.model(), u.parameter, found->second);
-      if (!(found->second >= lower && found->second <= upper))
-        throw InputError({"--start", 0}, fmt::format("{}={:g}", p.name, found->second), fmt::format("wanted a value from {:g} to {:g}", lower, upper), "");
-      u.value = found->second;
-    }
-}
-
 Arrival first_guess(const FitProblem& problem, const std::shared_ptr<const AeroelasticModel>& model, const Windows& windows, const std::map<std::string, double>& starts) {
   Arrival start{model, windows, make_joint(*model, problem.runs, windows, growing_horizons(problem.runs).front())};
   set_starts(start.joint, starts);
   hold_undetermined(start.joint);
   guess_from_spectra(start.joint);
   return start;
-}
-
-/// Power of what a fit leaves of the gauge in each run, over the power of white noise with its variance, as a function of frequency.
-class ResidualLines {
- public:
-  explicit ResidualLines(const JointProblem& joint) {
-    for (std::size_t r = 0; r < joint.runs().size(); ++r) {
-      const RunResidual& run = joint.runs()[r];
-      const RunResidual::Prediction p = run.predict(joint.theta(r));
-      VectorXd left = run.run().channel(p.channels.front()).value - p.output.col(0);
-      for (Index k = 0; k < left.size(); ++k)
-        if (!(run.channel_weight(0)[k] > 0) || !std::isfinite(left[k])) left[k] = 0;
-      left /= std::max(1e-300, std::sqrt(left.squaredNorm() / static_cast<double>(left.size())));
-      power_.push_back(fourier(left, padding * left.size()).cwiseAbs2() / static_cast<double>(left.size()));
-      duration_.push_back(run.run().dt * static_cast<double>(left.size()));
-    }
-  }
-  double power(std::size_t run, double frequency) const { return is_in(run, frequency) ? power_[run][line(run, frequency)] : 0; }
-  bool is_in(std::size_t run, double frequency) const { return frequency > 0 && line(run, frequency) < power_[run].size(); }
-  double resolution(std::size_t run) const { return 1 / duration_[run]; }
-
- private:
-  static constexpr Index padding = 8;  // the nearest line is at most a sixteenth of the resolution away, and shows 0.987 of the power
-  Index line(std::size_t run, double frequency) const { return static_cast<Index>(std::lround(frequency * duration_[run] * static_cast<double>(padding))); }
-
-  std::vector<VectorXd> power_;
-  std::vector<double> duration_;  // s
-};
-
-/// Starts of a steady tone: where the lines of the residual's spectra, followed through the bands of its first parameter, add up to most.
-std::vector<VectorXd> tone_starts(const JointProblem& joint, const Effect& e) {
-  const ResidualLines lines(joint);
-  const Rig& rig = joint.model().rig();
-  const std::vector<Parameter>& parameters = e.parameters_on(rig);
-  VectorXd p(static_cast<Index>(parameters.size()));
-  for (Index k = 0; k < p.size(); ++k) p[k] = parameters[static_cast<std::size_t>(k)].start;
-  std::vector<Effect::Band> bands = e.bands;
-  if (bands.empty()) bands.emplace_back(parameters[0].lower, parameters[0].upper);
-  std::vector<std::pair<double, double>> found;  // power, parameter
-  for (const auto& [lower, upper] : bands) {
-    bool is_in_a_run = true;
-    for (p[0] = lower; p[0] < upper && is_in_a_run;) {
-      double power = 0, finest = upper - lower;
-      is_in_a_run = false;
-      for (std::size_t r = 0; r < joint.runs().size(); ++r) {
-        const Conditions& c = joint.runs()[r].conditions();
-        if (!e.acts(rig, c)) continue;
-        const double f = e.frequency(joint.model(), c, p);
-        power += lines.power(r, f);
-        is_in_a_run = is_in_a_run || lines.is_in(r, f);
-        finest = std::min(finest, 0.3 * lines.resolution(r) * p[0] / f);
-      }
-      found.emplace_back(power, p[0]);
-      p[0] += finest;
-    }
-  }
-  std::sort(found.rbegin(), found.rend());
-  std::vector<VectorXd> starts;
-  constexpr std::size_t most = 3;
-  for (const auto& [power, value] : found) {
-    p[0] = value;
-    const bool near_another = std::any_of(starts.begin(), starts.end(), [value = value](const VectorXd& s) { return std::abs(s[0] - value) < 0.05 * value; });
-    if (!near_another) starts.push_back(p);
-    if (starts.size() == most) break;
-  }
-  return starts;
-}
-
-/// Largest first argument of the nonlinear effects along the trajectories of the model.
-double largest_argument_of_model(const JointProblem& joint) {
-  double largest = 0;
-  for (std::size_t r = 0; r < joint.runs().size(); ++r)
-    if (const VectorXd seen = joint.runs()[r].largest_arguments(joint.theta(r)); seen.size() > 0) largest = std::max(largest, seen.maxCoeff());
-  return largest;
-}
-
-/// The same along the states that the decays ask for beside unknown forces; 0 without decays.
-double largest_argument_of_readings(const JointProblem& joint) {
-  if (!has_decays(joint)) return 0;
-  const BesideUnknownForces beside = beside_unknown_forces(joint);
-  double largest = 0;
-  for (std::size_t r = 0; r < joint.runs().size(); ++r) {
-    if (beside.states[r].size() == 0) continue;
-    const RunResidual& run = joint.runs()[r];
-    const Arguments arguments(run.model().system(run.conditions(), beside.joint.theta(r), run.channels()));
-    for (const Index first : arguments.first) largest = std::max(largest, (arguments.sees.value.row(first) * beside.states[r]).cwiseAbs().maxCoeff());
-  }
-  return largest;
-}
-
-/// `astray`: the model does not move as the rig did.
-std::vector<VectorXd> starts_of(JointProblem& joint, const Effect& e, bool astray) {
-  if (e.frequency && !e.parameters_on(joint.model().rig()).empty()) return tone_starts(joint, e);
-  if (!e.starts_for) return e.starts;
-  double largest = astray ? largest_argument_of_readings(joint) : 0;
-  if (!(largest > 0)) largest = largest_argument_of_model(joint);
-  return largest > 0 ? e.starts_for(joint.model(), largest) : e.starts;
-}
-
-/// Which of these starts, and where it leads: to where some iterations end, if that halves the chi-square `without` the effect, and to the best as it is if not. What starts leave as they are
-/// favours the one at which an effect does least. Where motions are estimated too iterations are dear, and the search goes through the decays first (fit/search/decays_first.h).
-JointProblem best_of(const std::vector<JointProblem>& starts, double without) {
-  if (starts.size() == 1) return starts.front();
-  const std::vector<RunResidual>& runs = starts.front().runs();
-  const bool with_motions = std::any_of(runs.begin(), runs.end(), [](const RunResidual& run) { return run.motion().unknowns() > 0; });
-  const auto least = [](const std::vector<JointProblem>& joints) {
-    std::vector<double> left(joints.size());
-    in_parallel(joints.size(), [&](std::size_t i) {
-      left[i] = joints[i].chi2();
-      if (!std::isfinite(left[i])) left[i] = std::numeric_limits<double>::max();
-    });
-    const auto best = std::min_element(left.begin(), left.end());
-    return std::pair(*best, static_cast<std::size_t>(best - left.begin()));
-  };
-  const std::size_t start = least(starts).second;
-  if (with_motions) return starts[start];
-  std::vector<JointProblem> solved = starts;
-  in_parallel(solved.size(), [&](std::size_t i) {
-    JointProblem::SolveOptions options;
-    options.iterations = 8;
-    options.most_evaluations = 12;
-    options.tolerance = 1e-2;
-    solved[i].solve(options);
-  });
-  const auto [left, end] = least(solved);
-  constexpr double worth_it = 0.5;
-  return left < worth_it * without ? solved[end] : starts[start];
-}
-
-/// The best of each effect's starts; never none of it, from where it may have no slope.
-void choose_effect_starts(Arrival& arrival, const FitProblem& problem, const std::vector<std::string>& added, double without) {
-  JointProblem at_the_rig = arrival.joint;
-  constexpr double astray = 10;  // what a rig moves by there says nothing of the size of a force
-  const bool lost = back_to_the_rig(at_the_rig, astray);
-  if (lost) back_to_the_rig(at_the_rig, 2);
-  JointProblem& judge = lost ? at_the_rig : arrival.joint;
-  for (const std::string& id : added) {
-    tell(problem, "looking for " + id);
-    const auto& parameters = effect(problem.rig, id).parameters_on(arrival.joint.model().rig());
-    std::vector<JointProblem> starts;
-    for (const VectorXd& start : starts_of(judge, effect(problem.rig, id), lost)) {
-      starts.push_back(judge);
-      for (Unknown* u : unknowns_of(starts.back(), id))
-        for (std::size_t k = 0; k < parameters.size(); ++k)
-          if (judge.parameter(*u).name == id + "." + parameters[k].name) u->value = start[static_cast<Index>(k)];
-    }
-    if (starts.empty()) continue;
-    judge = best_of(starts, without);
-    if (!lost) continue;
-    const std::vector<Unknown*> own = unknowns_of(arrival.joint, id), found = unknowns_of(judge, id);
-    for (std::size_t k = 0; k < own.size(); ++k) own[k]->value = found[k]->value;
-  }
-  set_starts(arrival.joint, problem.start);
 }
 
 /// Widens a window of a run's motion where the gauge still sees the shaft move beyond it: chi-square must fall by clearly more than the knots added.
@@ -408,29 +254,6 @@ Arrival arrive(const FitProblem& problem, const std::shared_ptr<const Aeroelasti
   solve(renumbered, options);
   constexpr double rounding = 1e-6;
   return renumbered.joint.chi2() < (1 + rounding) * arrival.joint.chi2() ? renumbered : arrival;
-}
-
-Arrival extend(const FitProblem& problem, const Arrival& without, const std::shared_ptr<const AeroelasticModel>& model, const std::vector<std::string>& added) {
-  Arrival arrival{model, without.windows, make_joint(*model, problem.runs, without.windows, 0)};
-  for (const Unknown& known : without.joint.unknowns()) {
-    const std::string& name = without.joint.parameter(known).name;
-    for (Unknown& u : arrival.joint.unknowns())
-      if (u.run == known.run && arrival.joint.parameter(u).name == name) u.value = known.value;
-  }
-  const VectorXd anywhere = model->start_values();
-  for (std::size_t r = 0; r < arrival.joint.runs().size(); ++r) {
-    RunResidual& run = arrival.joint.runs()[r];
-    const RunResidual& known = without.joint.runs()[r];
-    run.keep_noise_of(known);
-    run.start_from(known);
-    run.follow_in(known.finer());
-    run.set_aside(known.is_aside() && run.takes_small_steps(anywhere));
-  }
-  for (RunResidual& run : arrival.joint.runs()) run.glance(true);
-  choose_effect_starts(arrival, problem, added, without.joint.chi2());
-  hold_undetermined(arrival.joint);
-  for (RunResidual& run : arrival.joint.runs()) run.glance(false);
-  return arrival;
 }
 
 Arrival arrive_with_effects(const FitProblem& problem, const Arrival& like, const ArrivalEffort& effort) {

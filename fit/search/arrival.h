@@ -34,8 +34,11 @@ struct ArrivalEffort {
 /// From the problem's start values to the whole record by way of windows that grow from a few periods. The effects of the problem are left out.
 Arrival arrive(const FitProblem& problem, const std::shared_ptr<const AeroelasticModel>& model, const ArrivalEffort& effort = {});
 
-/// With `model`, the one with the effects `added`, and nothing searched for yet: values of the fit `without` them where it has them, the best of their starts for the effects.
-Arrival extend(const FitProblem& problem, const Arrival& without, const std::shared_ptr<const AeroelasticModel>& model, const std::vector<std::string>& added);
+/// A fit of these runs over the first `horizon` samples (0: all), at the model's start values.
+JointProblem make_joint(const AeroelasticModel& model, const std::vector<Run>& runs, const std::vector<std::vector<MotionBasis::Window>>& windows, Eigen::Index horizon);
+
+/// Gives the unknowns of these names these values. Throws InputError for a value that is out of range.
+void set_starts(JointProblem& joint, const std::map<std::string, double>& starts);
 
 /// All the way from first guesses with the effects of `model` at work from the first window on; those start from the values that `like` has for them.
 Arrival arrive_with_effects(const FitProblem& problem, const Arrival& like, const ArrivalEffort& effort = {});

@@ -16,6 +16,7 @@
 #include "fit/search/own_parameters.h"
 #include "fit/likelihood/readings_noise.h"
 #include "fit/likelihood/standardised_residual.h"
+#include "fit/uncertainty/undetermined.h"
 
 namespace unrig {
 namespace {
@@ -133,20 +134,6 @@ std::vector<LeftOfRun> left_of_runs(const JointProblem& joint) {
   return all;
 }
 
-/// How far chi-square would fall by one Gauss-Newton step in all unknowns.
-double promised_share(const JointProblem& joint, double before) {
-  const JointProblem::Linearisation lin = joint.linearise();
-  std::vector<Index> free;
-  for (std::size_t i = 0; i < joint.unknowns().size(); ++i)
-    if (!joint.unknowns()[i].held && lin.jacobian.col(static_cast<Index>(i)).norm() > 0) free.push_back(static_cast<Index>(i));
-  if (free.empty() || !lin.residual.allFinite()) return -INFINITY;  // the model runs away from where it would start
-  MatrixXd j = lin.jacobian(Eigen::all, free);
-  for (Index k = 0; k < j.cols(); ++k) j.col(k).normalize();
-  const Eigen::ColPivHouseholderQR<MatrixXd> qr(j);
-  const VectorXd left = lin.residual - j * qr.solve(lin.residual);
-  return 1 - left.squaredNorm() / before;
-}
-
 /// Weights of the runs such that each is left with about the power of its noise; true where that changed any by more than a tenth.
 bool temper(JointProblem& joint) {
   bool changed = false;
@@ -227,9 +214,9 @@ bool any_aside(const JointProblem& joint) {
 
 bool nonlinear(const Trial& trial) {
   const JointProblem& joint = trial.arrival.joint;
-  for (std::size_t r = 0; r < joint.runs().size(); ++r)
-    if (joint.runs()[r].largest_arguments(joint.theta(r)).size() > 0) return true;
-  return false;
+  return std::any_of(joint.runs().begin(), joint.runs().end(), [&, r = std::size_t{0}](const RunResidual& run) mutable {
+    return !run.model().system(run.conditions(), joint.theta(r++), run.channels()).feedback.empty();
+  });
 }
 
 bool brings_a_law(const Trial& trial) {
@@ -323,29 +310,30 @@ void take_noise_of(Trial& trial, const Trial& other) {
   fit_fully(trial, 5);
 }
 
-Trial prepare(const FitProblem& problem, const Trial& base, const std::vector<std::string>& effects) {
+Trial screened(const FitProblem& problem, const Screening& screening, const Trial& base, const std::vector<std::string>& effects) {
   std::vector<std::string> added;
   for (const std::string& id : effects)
     if (std::find(base.effects.begin(), base.effects.end(), id) == base.effects.end()) added.push_back(id);
   const auto model = std::make_shared<const AeroelasticModel>(model_of(problem.rig, problem.runs, problem.circulation, effects));
-  Trial trial{effects, extend(problem, base.arrival, model, added)};
+  Screening::Extended extended = screening.extend(model, added);
+  Trial trial{effects, std::move(extended.arrival), extended.share};
   if (any_aside(trial.arrival.joint)) trial.decays = base.decays;
-  for (RunResidual& run : trial.arrival.joint.runs()) run.glance(true);
-  trial.score = promised_share(trial.arrival.joint, base.arrival.joint.chi2());
-  for (RunResidual& run : trial.arrival.joint.runs()) run.glance(false);
   return trial;
 }
 
-double faint_promise(const Trial& trial, const Trial& base) {
-  constexpr double faint = 1e-3;  // not 0, where the shape of a law has no slope; no count behind it
-  JointProblem joint = trial.arrival.joint;
-  const std::vector<Unknown*> own = unknowns_of(joint, trial.effects.back());
-  if (own.empty()) return trial.score;
-  Unknown& size = *own.front();
-  size.value = std::clamp(faint * size.value, joint.parameter(size).lower, joint.parameter(size).upper);
-  for (RunResidual& run : joint.runs()) run.glance(true);
-  return promised_share(joint, base.arrival.joint.chi2());
+void hold_undetermined(Trial& trial) {
+  for (RunResidual& run : trial.arrival.joint.runs()) run.glance(true);
+  hold_undetermined(trial.arrival.joint);
+  for (RunResidual& run : trial.arrival.joint.runs()) run.glance(false);
 }
+
+Trial prepare(const FitProblem& problem, const Screening& screening, const Trial& base, const std::vector<std::string>& effects) {
+  Trial trial = screened(problem, screening, base, effects);
+  hold_undetermined(trial);
+  return trial;
+}
+
+Trial prepare(const FitProblem& problem, const Trial& base, const std::vector<std::string>& effects) { return prepare(problem, Screening(problem, base.arrival), base, effects); }
 
 void fit_fully(Trial& trial, int rounds) {
   anneal(trial.arrival, rounds);

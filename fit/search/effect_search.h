@@ -6,6 +6,7 @@
 
 #include "fit/search/arrival.h"
 #include "fit/search/decays_first.h"
+#include "fit/search/screening.h"
 
 namespace unrig {
 
@@ -58,11 +59,15 @@ bool take_noise_colour(Trial& trial);
 /// Gives the runs of `trial` the noise of those of `other`, and fits again, where that has a colour.
 void take_noise_of(Trial& trial, const Trial& other);
 
-/// One linear step from `base` with `effects` (those of base and one more): what would it remove?
-Trial prepare(const FitProblem& problem, const Trial& base, const std::vector<std::string>& effects);
+/// `effects`, those of base and one or more: where their search begins, and as score what one linear step from `base` would remove. `screening`: of base.
+Trial screened(const FitProblem& problem, const Screening& screening, const Trial& base, const std::vector<std::string>& effects);
 
-/// The same of a prepared trial where the size of its last effect is a thousandth of its start: what a law promises that does little.
-double faint_promise(const Trial& trial, const Trial& base);
+/// Holds the unknowns of a screened trial that its runs do not determine: ready to be fitted.
+void hold_undetermined(Trial& trial);
+
+/// Both.
+Trial prepare(const FitProblem& problem, const Screening& screening, const Trial& base, const std::vector<std::string>& effects);
+Trial prepare(const FitProblem& problem, const Trial& base, const std::vector<std::string>& effects);
 
 /// Residual power over noise power of the runs whose motion is not estimated.
 double left_of_decays(const Trial& trial);

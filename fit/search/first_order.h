@@ -1,0 +1,39 @@
+#pragma once
+#include <Eigen/Core>
+#include <string>
+#include <vector>
+
+#include "fit/likelihood/joint_problem.h"
+#include "fit/likelihood/run_first_order.h"
+
+namespace unrig {
+
+/// A joint fit to first order about where it stands, against which laws that are not at work in it are held: their forces on its own trajectories, sent through the rig onto what is left of the readings.
+class FirstOrder {
+ public:
+  /// Looks at `joint` as long as it lives.
+  explicit FirstOrder(const JointProblem& joint);
+  /// Not of a fit in which a force wanders or the model runs away.
+  bool known() const;
+
+  struct Promise {
+    double share = 0;             ///< of chi-square that one linear step in all unknowns removes, those of `with` included; minus infinity where a model runs away
+    double largest_argument = 0;  ///< that the laws' first arguments reach
+  };
+  /// `with`: the same runs with effect `id` beside, with the shape that it stands at and a size (its first parameter) that is next to nothing.
+  Promise promise(const JointProblem& with, const std::string& id) const;
+
+ private:
+  const JointProblem& joint_;
+  std::vector<RunResidual::FirstOrder> runs_;
+  double chi2_ = 0;
+};
+
+/// The combination x of columns that leaves least of r, and |r - columns x|^2; columns that others can do without are left at 0.
+struct LinearStep {
+  Eigen::VectorXd x;
+  double left = 0;
+};
+LinearStep linear_step(const Eigen::MatrixXd& columns, const Eigen::VectorXd& r);
+
+}  // namespace unrig
