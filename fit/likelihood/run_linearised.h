@@ -210,6 +210,7 @@ struct RunResidual::Linearised {
   std::unique_ptr<run_rows::Eliminator> eliminate;
   Eigen::VectorXd linear;
   double chi2 = 0;
+  bool settled = false;  // of a nonlinear model: the search for c came to rest by itself, and would again
 
   // Where noise of the inputs colours all readings of a run (fit/likelihood/run_input_noise.cpp). Its weights are then a filter over the whole record, not a number for each reading.
   std::shared_ptr<const InputNoise> noise;  // as the model at this theta lets it through; none where the inputs count as exact

@@ -252,9 +252,11 @@ bool RunResidual::search_along_tangents(Linearised& lin, const VectorXd& theta, 
   constexpr double least_damping = 1e-4, most_damping = 1e4, growth = 10, much = 0.02;
   double damping = 0;
   bool near = false;
+  lin.settled = true;
   for (int i = 0; i < most; ++i) {
     if (!stack_nonlinear_rows(lin, theta, point.linear)) {
       lin.chi2 = INFINITY;
+      lin.settled = false;
       return false;
     }
     const VectorXd step = lin.linear - point.linear;
@@ -276,6 +278,7 @@ bool RunResidual::search_along_tangents(Linearised& lin, const VectorXd& theta, 
     damping = damping > least_damping ? damping / growth : 0;
     point = std::move(next);
   }
+  lin.settled = false;
   return near;
 }
 
@@ -307,6 +310,7 @@ void RunResidual::follow_nonlinear_partials(const LinearSystem& system, const Ve
 
 bool RunResidual::find_linear(const VectorXd& theta, bool thoroughly) {
   if (model_->system(conditions_, theta, channels_).feedback.empty()) return false;
+  forget_solutions();
   from_afar_ = true;
   in_vain_ = 0;
   thorough_ = thoroughly;

@@ -158,10 +158,13 @@ class RunResidual {
 
   /// Starts the search for c, where it needs one, from that of the same run held against another model or over another horizon.
   void start_from(const RunResidual& other) {
-    if (other.last_linear_.size() == unknowns_) last_linear_ = other.last_linear_;
+    if (other.last_linear_.size() == unknowns_) start_from(other.last_linear_);
   }
 
-  void start_from(const Eigen::VectorXd& linear) { last_linear_ = linear; }
+  void start_from(const Eigen::VectorXd& linear) {
+    last_linear_ = linear;
+    forget_solutions();
+  }
 
   /// Takes over noise levels and samples left out from the same run held against another model.
   void keep_noise_of(const RunResidual& other);
@@ -209,7 +212,10 @@ class RunResidual {
   bool is_aside() const { return aside_; }
 
   /// A glance at a nonlinear run: c in two steps, and the model in one step a sample whatever its laws ask for. Enough to compare starts and candidates.
-  void glance(bool only) { glance_ = only; }
+  void glance(bool only) {
+    if (glance_ != only) forget_solutions();
+    glance_ = only;
+  }
 
   /// Follows nonlinear laws in so many times the steps that they ask for.
   void follow_in(Eigen::Index times) {
@@ -227,7 +233,10 @@ class RunResidual {
 
   /// How near c of a nonlinear run is searched to its least chi-square, in standard errors. The slopes of chi-square in theta do not feel what is left: they are
   /// taken across the directions of c.
-  void search_linear_to(double precision) { linear_precision_ = precision; }
+  void search_linear_to(double precision) {
+    if (precision < linear_precision_) forget_solutions();
+    linear_precision_ = precision;
+  }
 
   /// States that the run may start with: behind the motion's unknowns in c, before the offsets.
   const std::vector<Eigen::Index>& free_states() const { return free_; }
@@ -317,7 +326,7 @@ class RunResidual {
   Eigen::Index spikes_ = 0;
   Eigen::Index last_sample_ = 0;
 
-  /// Of a linear model: the last theta that was asked for, whose answer does not depend on what was asked before; and the derivatives there.
+  /// The last theta that was asked for, of a nonlinear model where the search for c arrived; and the derivatives there.
   mutable Solution last_solution_;
   mutable Evaluation last_evaluation_;
 

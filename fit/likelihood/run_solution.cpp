@@ -261,7 +261,10 @@ RunResidual::Solution RunResidual::solve(const VectorXd& theta) const {
   const std::shared_ptr<Linearised> lin = linearise(theta);
   if (!lin->system.feedback.empty()) {
     solve_nonlinear(*lin, theta);
-    return {theta, lin->chi2, lin->linear, lin};
+    const Solution solution{theta, lin->chi2, lin->linear, lin};
+    last_evaluation_ = {};
+    last_solution_ = lin->settled ? solution : Solution{};
+    return solution;
   }
   stack_rows(*lin);
   last_evaluation_ = {};

@@ -56,8 +56,9 @@ std::vector<VectorXd> tone_starts(const ResidualLines& lines, const JointProblem
     if (std::none_of(values.begin(), values.end(), [value = value](double other) { return std::abs(other - value) < 0.05 * value; })) values.push_back(value);
     if (values.size() == most) break;
   }
+  const bool has_starts = !e.starts.empty() && e.starts.front().size() == p.size();  // those of a beam are not those of modes
   for (const double value : values)
-    for (VectorXd start : e.starts.empty() ? std::vector<VectorXd>{p} : e.starts) {
+    for (VectorXd start : has_starts ? e.starts : std::vector<VectorXd>{p}) {
       start[0] = value;
       starts.push_back(std::move(start));
     }
