@@ -168,4 +168,17 @@ Mismatch locate_mismatch(const JointProblem& joint) {
   return mismatch;
 }
 
+bool has_line(const JointProblem& joint, const Effect& e) {
+  const auto tests = static_cast<double>(e.bands.size() * joint.runs().size());
+  for (std::size_t r = 0; r < joint.runs().size() && e.frequency; ++r) {
+    const RunResidual& run = joint.runs()[r];
+    if (run.is_aside() || !e.acts(joint.model().rig(), run.conditions())) continue;
+    const VectorXd theta = joint.theta(r), left = standardised_residual(run, theta, run.predict(theta), 0);
+    const auto at = [&](double parameter) { return run.run().dt * e.frequency(joint.model(), run.conditions(), VectorXd::Constant(1, parameter)); };
+    for (const auto& [lower, upper] : e.bands)
+      if (tests * strongest_line(left, at(lower), at(upper)).p_value < significant) return true;
+  }
+  return false;
+}
+
 }  // namespace unrig

@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "core/effects/effect.h"
 #include "fit/force/run_states.h"
 #include "fit/likelihood/joint_problem.h"
 
@@ -36,5 +37,9 @@ std::string in_words_of_power(double exponent);
 /// cumulative periodogram. A line, in runs without nonlinear laws, whose steps leave lines of their own: Fisher's test of the largest. A mismatch is found where the p-value, corrected for the number of channels, is below 1e-3 and it is a line's or the residual's power exceeds the noise's
 /// by more than 5 %: a motion that is known to its noise leaves up to that, and no line.
 Mismatch locate_mismatch(const JointProblem& joint);
+
+/// Whether what is left of the gauge has a line where the frequency of an effect is known beforehand (Effect::bands), which stands out of what lies around it however much the fit leaves: noise of any colour
+/// has one as strong in one campaign of a thousand. Fisher's test in each band and run (strongest_line), corrected for their number.
+bool has_line(const JointProblem& joint, const Effect& e);
 
 }  // namespace unrig

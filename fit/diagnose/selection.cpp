@@ -198,7 +198,7 @@ Trials Selection::try_one_more(const Trial& base, const Strings& hopeless) {
       if (!done && !favours_linear) fit_anew(fit_problem_, linear);
       const bool decays_have_told = has_decays(base.arrival.joint);  // from first guesses nonlinear laws are not found where their decays do not lead
       if (!done && !decays_have_told && !any_leaves_nothing(linear)) fit_anew(fit_problem_, followed);
-      if (!done && !any_does() && base.effects.empty() && base.reduced_chi2() > nearly_explained) fit_others_anew(fit_problem_, linear);
+      if (!done && !any_does() && is_first(base) && base.reduced_chi2() > nearly_explained) fit_others_anew(fit_problem_, linear);
       if (!any_does()) {  // far from the truth one linear step promises little of what there is
         fit_linear(unpromising);
         fit_anew(fit_problem_, unpromising);
@@ -315,7 +315,25 @@ void Selection::stop() {
   stopped_ = true;
 }
 
+/// Far from the noise a signal at a frequency that is known beforehand (Effect::bands) is drowned in what else is left, and yet nothing else makes its line: it is taken out first, or laws have it to follow.
+void Selection::take_known_lines(Trial& best) {
+  for (const std::string& id : candidates({}, {})) {
+    const Effect& e = effect(id);
+    if (e.bands.empty() || !has_line(best.arrival.joint, e)) continue;
+    tell("taking out " + id);
+    Strings set = best.effects;
+    set.push_back(id);
+    Trial with = prepare(fit_problem_, best, set);
+    fit_fully(with, 2);
+    ranking_.push_back({set, with.reduced_chi2(), bic_difference(with, baseline_), 0, with.score});
+    lines_.push_back(id);
+    best = std::move(with);
+  }
+  if (!lines_.empty() && !what_remains(best).found) best = challenged(std::move(best));
+}
+
 void Selection::grow(Trial& best, const std::function<bool(const Trial&)>& enough, std::optional<Trial>& sufficient) {
+  if (best.reduced_chi2() > twice_the_noise) take_known_lines(best);
   Strings hopeless;  // laws with which alone the fit is worse than without: from that far away they are not found, and are not tried again before half of the way is gone
   while (!stopped_ && best.effects.size() < most_effects && what_remains(best).found) {
     best = in_finer_steps(best);
@@ -325,12 +343,12 @@ void Selection::grow(Trial& best, const std::function<bool(const Trial&)>& enoug
     tell(best.effects.empty() ? "trying what may be missing" : "trying what may be missing beside " + best.effects.back());
     Trials tried = try_one_more(best, hopeless);
     for (const Trial& t : tried)
-      if (best.effects.empty() && brings_a_law(t) && bic_difference(t, baseline_) > decisive) hopeless.push_back(t.effects.back());
+      if (is_first(best) && brings_a_law(t) && bic_difference(t, baseline_) > decisive) hopeless.push_back(t.effects.back());
     if (best.effects.empty()) try_with_all_modes(tried);
     std::erase_if(tried, [&](const Trial& t) { return !leaves_nothing(t) && takes_nothing(t, best); });
     if (tried.empty()) break;
     const Trial next = tried.front();
-    if (!(best.effects.empty() || plausible(next)) || bic_difference(next, best) > -decisive) break;
+    if (!(is_first(best) || plausible(next)) || bic_difference(next, best) > -decisive) break;
     if (next.excess() < half_way * best.excess()) hopeless.clear();
     best = next;
     if (!stopped_) {
@@ -354,7 +372,8 @@ Trial Selection::best_set(const std::function<bool(const Trial&)>& enough) {
   } catch (const OutOfTime&) {
     stop();
   }
-  return sufficient && what_remains(best).found ? *sufficient : best;
+  if (sufficient && what_remains(best).found) return *sufficient;
+  return bic_difference(best, baseline_) > -decisive ? baseline_ : best;  // of lines alone
 }
 
 /// Probabilities: exp(-BIC/2) over the sum of it over all.

@@ -42,6 +42,9 @@ class Selection {
  private:
   void grow(Trial& best, const std::function<bool(const Trial&)>& enough, std::optional<Trial>& sufficient);
   void stop();
+  void take_known_lines(Trial& best);
+  /// Whether nothing has been found beside them.
+  bool is_first(const Trial& base) const { return base.effects.size() == lines_.size(); }
   std::vector<std::string> candidates(const std::vector<std::string>& at_work, const std::vector<std::string>& hopeless) const;
   std::vector<Trial> try_one_more(const Trial& base, const std::vector<std::string>& hopeless);
   Trial without_superfluous(Trial trial);
@@ -58,6 +61,7 @@ class Selection {
   const Trial& baseline_;
   std::vector<Trial> tried_;
   std::vector<Candidate> ranking_;
+  std::vector<std::string> lines_;  // signals at frequencies known beforehand that were taken out first
   bool stopped_ = false;
 };
 

@@ -163,18 +163,22 @@ double whiteness(const std::vector<VectorXd>& residuals) {
   return std::min(1.0, least * static_cast<double>(residuals.size()));
 }
 
-Line strongest_line(const VectorXd& residual) {
-  constexpr Index finer = 2, least = 16;
+Line strongest_line(const VectorXd& residual) { return strongest_line(residual, 0, 0.5); }
+
+Line strongest_line(const VectorXd& residual, double from, double to) {
+  constexpr Index finer = 2, least = 16, beside = 30;
   const Index n = residual.size();
   if (n < least || residual.isZero(0)) return {};
   const VectorXd power = fourier(residual, finer * n).cwiseAbs2();
-  const double independent = static_cast<double>(n) / 2;
+  const auto place = [&](double frequency) { return std::clamp<Index>(std::lround(frequency * static_cast<double>(finer * n)), finer, power.size() - finer - 1); };  // neither the mean nor the last
+  const Index first = place(from), last = place(to), around_first = place(from - static_cast<double>(beside) / static_cast<double>(n)), around_last = place(to + static_cast<double>(beside) / static_cast<double>(n));
   Index at = 0;
-  const double most = power.segment(finer, power.size() - 2 * finer).maxCoeff(&at);  // neither the mean nor the last
+  const double most = power.segment(first, last - first + 1).maxCoeff(&at), all = power.segment(around_first, around_last - around_first + 1).sum() / finer;
+  const double independent = static_cast<double>(around_last - around_first + 1) / finer;
   Line line;
-  line.place = static_cast<double>(at + finer) / static_cast<double>(finer * n);
-  line.over_mean = most / residual.squaredNorm();
-  line.p_value = std::min(1.0, static_cast<double>(finer) * independent * std::pow(std::max(0.0, 1 - line.over_mean / independent), independent - 1));
+  line.place = static_cast<double>(at + first) / static_cast<double>(finer * n);
+  line.over_mean = independent * most / all;
+  line.p_value = std::min(1.0, static_cast<double>(finer) * independent * std::pow(std::max(0.0, 1 - most / all), independent - 1));
   return line;
 }
 

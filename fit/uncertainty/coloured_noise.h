@@ -59,6 +59,8 @@ struct Line {
 };
 /// Left-out samples are 0; none of a record of less than sixteen samples.
 Line strongest_line(const Eigen::VectorXd& residual);
+/// The strongest line between two frequencies (over that of the samples), against those up to thirty resolutions to either side, among which noise of any colour is all but white.
+Line strongest_line(const Eigen::VectorXd& residual, double from, double to);
 
 /// Probability that independent noise of one distribution, whatever its level and tails, comes as unevenly over the record: sums of its size about the mean, held against a Brownian bridge (R. L. Brown, J. Durbin and
 /// J. M. Evans, J. Royal Statistical Society B 37 (1975) 149). Of the absolute value, which has a variance where squares have none. Left-out samples are 0.

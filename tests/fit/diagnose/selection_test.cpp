@@ -170,6 +170,21 @@ TEST_F(LongSelection, SharpFrictionIsFollowedInFinerSteps) {
   EXPECT_FALSE(d.unexplained) << d.remaining.summary;
 }
 
+/// Far from the noise a hum is drowned in what friction leaves, and makes its line all the same: it is taken out first, with the friction to be found beside it.
+TEST(Selection, AKnownLineIsTakenOutBeforeALawIsLookedFor) {
+  const TrialCampaign campaign = pair(3602, 4, {"mains-hum", "coulomb-friction"}, true);
+  ASSERT_LT(campaign.sizes[0], 0.1 * campaign.sizes[1]);
+  const Diagnosis d = verdict_on(campaign, {"mains-hum", "coulomb-friction"});
+  EXPECT_THAT(found_in(d), testing::ElementsAre("mains-hum", "coulomb-friction")) << "in this order";
+  EXPECT_FALSE(d.unexplained);
+}
+
+/// The decays beside a gap are not followed while a hum of two and a half times the noise is in them.
+TEST_F(LongSelection, AGapIsFoundBesideAHum) {
+  UNRIG_NEEDS_SHARED("campaigns/open2");
+  EXPECT_THAT(found_in(verdict_on(recorded("a7"), {"freeplay", "mains-hum", "coulomb-friction"})), UnorderedElementsAre("freeplay", "mains-hum"));
+}
+
 /// The decays cross the corners for seconds, and are explained by a law that is trusted to within some per cent; the steps are followed to the noise from what the decays tell.
 TEST_F(LongSelection, StepsOfARigWithAGapAreFollowedToTheNoise) {
   const Diagnosis d = verdict_on(pair(3902, 5, {"freeplay"}, true), {"freeplay", "coulomb-friction", "wagner-lag"});

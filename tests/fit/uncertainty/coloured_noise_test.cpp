@@ -113,6 +113,13 @@ TEST(StrongestLine, IsFoundAtItsFrequency) {
     EXPECT_LT(line.p_value, 1e-10) << cycles;
     EXPECT_GT(line.over_mean, 30) << cycles << ": n a^2 / 4 is 62, of which a place a quarter of a line away shows four fifths";
   }
+  // In a band: a stronger one outside it does not count, nor for what lies around.
+  VectorXd two = white_noise(samples, 1, 3);
+  for (Index k = 0; k < samples; ++k) two[k] += 0.5 * std::sin(2 * 3.14159265358979323846 * 200 * static_cast<double>(k) / samples) + 50 * std::sin(2 * 3.14159265358979323846 * 20 * static_cast<double>(k) / samples);
+  const Line line = strongest_line(two, 0.19, 0.21);
+  EXPECT_NEAR(line.place, 0.2, 0.5 / samples);
+  EXPECT_LT(line.p_value, 1e-8);
+  EXPECT_GT(strongest_line(two, 0.29, 0.31).p_value, 1e-3);
   EXPECT_EQ(strongest_line(VectorXd::Zero(100)).p_value, 1);
   EXPECT_EQ(strongest_line(white_noise(8, 1, 1)).p_value, 1);
 }
