@@ -310,21 +310,37 @@ void take_noise_of(Trial& trial, const Trial& other) {
   fit_fully(trial, 5);
 }
 
-Trial screened(const FitProblem& problem, const Screening& screening, const Trial& base, const std::vector<std::string>& effects) {
+namespace {
+
+/// Those that the base lacks.
+std::vector<std::string> added_to(const Trial& base, const std::vector<std::string>& effects) {
   std::vector<std::string> added;
   for (const std::string& id : effects)
     if (std::find(base.effects.begin(), base.effects.end(), id) == base.effects.end()) added.push_back(id);
-  const auto model = std::make_shared<const AeroelasticModel>(model_of(problem.rig, problem.runs, problem.circulation, effects));
-  Screening::Extended extended = screening.extend(model, added);
+  return added;
+}
+
+std::shared_ptr<const AeroelasticModel> model_with(const FitProblem& problem, const std::vector<std::string>& effects) {
+  return std::make_shared<const AeroelasticModel>(model_of(problem.rig, problem.runs, problem.circulation, effects));
+}
+
+void glance(Trial& trial, bool only) {
+  for (RunResidual& run : trial.arrival.joint.runs()) run.glance(only);
+}
+
+}  // namespace
+
+Trial screened(const FitProblem& problem, const Screening& screening, const Trial& base, const std::vector<std::string>& effects) {
+  Screening::Extended extended = screening.extend(model_with(problem, effects), added_to(base, effects));
   Trial trial{effects, std::move(extended.arrival), extended.share};
   if (any_aside(trial.arrival.joint)) trial.decays = base.decays;
   return trial;
 }
 
 void hold_undetermined(Trial& trial) {
-  for (RunResidual& run : trial.arrival.joint.runs()) run.glance(true);
+  glance(trial, true);
   hold_undetermined(trial.arrival.joint);
-  for (RunResidual& run : trial.arrival.joint.runs()) run.glance(false);
+  glance(trial, false);
 }
 
 Trial prepare(const FitProblem& problem, const Screening& screening, const Trial& base, const std::vector<std::string>& effects) {
@@ -333,7 +349,16 @@ Trial prepare(const FitProblem& problem, const Screening& screening, const Trial
   return trial;
 }
 
-Trial prepare(const FitProblem& problem, const Trial& base, const std::vector<std::string>& effects) { return prepare(problem, Screening(problem, base.arrival), base, effects); }
+Trial prepare(const FitProblem& problem, const Trial& base, const std::vector<std::string>& effects) {
+  if (!added_to(base, effects).empty()) return prepare(problem, Screening(problem, base.arrival), base, effects);
+  Trial fewer{effects, transferred(problem, base.arrival, model_with(problem, effects))};
+  if (any_aside(fewer.arrival.joint)) fewer.decays = base.decays;
+  glance(fewer, true);
+  fewer.score = promised_share(fewer.arrival.joint, base.arrival.joint.chi2());
+  hold_undetermined(fewer.arrival.joint);
+  glance(fewer, false);
+  return fewer;
+}
 
 void fit_fully(Trial& trial, int rounds) {
   anneal(trial.arrival, rounds);

@@ -40,69 +40,91 @@ FirstOrder::FirstOrder(const JointProblem& joint) : joint_(joint) {
 }
 
 bool FirstOrder::known() const {
-  return std::all_of(runs_.begin(), runs_.end(), [](const RunResidual::FirstOrder& run) { return run.known(); });
+  for (std::size_t r = 0; r < runs_.size(); ++r)
+    if (!joint_.runs()[r].is_aside() && !runs_[r].known()) return false;
+  return true;
+}
+
+/// Run by run, with the effect at next to nothing where it acts; nothing of runs that are set aside.
+std::vector<FirstOrder::Beside> FirstOrder::beside(const JointProblem& with, const std::string& id, const std::vector<Index>& own, const std::vector<VectorXd>& begins) const {
+  constexpr double faint = 1e-3;  // of where its size stands: a force on trajectories that it hardly bends; not 0, where the shape of a law has no slope
+  std::vector<Beside> rows(runs_.size());
+  in_parallel(runs_.size(), [&](std::size_t r) {
+    const RunResidual& run = with.runs()[r];
+    if (run.is_aside() || joint_.runs()[r].is_aside()) return;
+    if (!effect(with.model().rig(), id).acts(with.model().rig(), run.conditions())) {
+      rows[r] = {runs_[r].slopes(), runs_[r].left()};
+      return;
+    }
+    VectorXd theta = with.theta(r);
+    if (!own.empty()) {
+      const Parameter& size = with.model().parameters()[static_cast<std::size_t>(own.front())];
+      theta[own.front()] = std::clamp(faint * theta[own.front()], size.lower, size.upper);
+    }
+    rows[r] = runs_[r].beside(run, theta, own, begins[r]);
+  });
+  return rows;
+}
+
+/// How many states the other model has beside this one's in a run.
+Index FirstOrder::further_states(std::size_t run, const std::vector<Index>& own, const Beside& rows) const {
+  const Index known = runs_[run].slopes().cols();
+  return rows.slopes.cols() > known ? rows.slopes.cols() - known - static_cast<Index>(own.size()) : 0;
+}
+
+/// In [unknowns of the fit | the effect's own | further states, run by run].
+LinearStep FirstOrder::step(const std::vector<Unknown>& of_effect, const std::vector<Index>& own, const std::vector<Beside>& rows) const {
+  const auto known = static_cast<Index>(joint_.unknowns().size());
+  Index height = 0, column = known + static_cast<Index>(of_effect.size()), width = column;
+  for (std::size_t r = 0; r < rows.size(); ++r) {
+    height += rows[r].left.size();
+    width += further_states(r, own, rows[r]);
+  }
+  MatrixXd slopes = MatrixXd::Zero(height, width);
+  VectorXd left(height);
+  Index row = 0;
+  for (std::size_t r = 0; r < rows.size(); ++r) {
+    const Index parameters = runs_[r].slopes().cols(), length = rows[r].left.size(), states = further_states(r, own, rows[r]);
+    if (length == 0) continue;
+    const auto put = [&](Index where, Index from) { slopes.col(where).segment(row, length) = rows[r].slopes.col(from); };
+    const auto is_free_here = [&](const Unknown& u) { return !u.held && (u.run < 0 || u.run == static_cast<int>(r)); };
+    for (Index k = 0; k < known; ++k)
+      if (const Unknown& u = joint_.unknowns()[static_cast<std::size_t>(k)]; is_free_here(u)) put(k, u.parameter);
+    const bool acts = rows[r].slopes.cols() > parameters;
+    for (std::size_t k = 0; k < of_effect.size(); ++k)
+      if (acts && is_free_here(of_effect[k])) put(known + static_cast<Index>(k), parameters + (std::find(own.begin(), own.end(), of_effect[k].parameter) - own.begin()));
+    for (Index k = 0; k < states; ++k) put(column++, parameters + static_cast<Index>(own.size()) + k);
+    left.segment(row, length) = rows[r].left;
+    row += length;
+  }
+  return linear_step(slopes, left);
 }
 
 FirstOrder::Promise FirstOrder::promise(const JointProblem& with, const std::string& id) const {
-  const auto is_own = [&](const Unknown& u) { return with.parameter(u).name.starts_with(id + "."); };
-  std::vector<Index> own;  // parameters
-  for (const Unknown& u : with.unknowns())
-    if (is_own(u) && std::find(own.begin(), own.end(), u.parameter) == own.end()) own.push_back(u.parameter);
-  constexpr double faint = 1e-3;  // of where its size stands: a force on trajectories that it hardly bends; not 0, where the shape of a law has no slope
-  const auto theta_of = [&](std::size_t r) {
-    VectorXd theta = with.theta(r);
-    if (own.empty()) return theta;
-    const Parameter& size = with.model().parameters()[static_cast<std::size_t>(own.front())];
-    theta[own.front()] = std::clamp(faint * theta[own.front()], size.lower, size.upper);
-    return theta;
-  };
-  const auto known = static_cast<Index>(joint_.unknowns().size()), further = known + static_cast<Index>(with.unknowns().size());
+  std::vector<Unknown> of_effect;
+  std::vector<Index> own;  // their parameters, each once
+  for (const Unknown& u : with.unknowns()) {
+    if (!with.parameter(u).name.starts_with(id + ".")) continue;
+    of_effect.push_back(u);
+    if (std::find(own.begin(), own.end(), u.parameter) == own.end()) own.push_back(u.parameter);
+  }
   Promise promise{-INFINITY, 0};
   std::vector<VectorXd> begins(runs_.size());  // of states that only `with` has
-  constexpr int steps = 2;  // a signal's shape has no slope before its amplitude is told
+  constexpr int steps = 2;  // the shape of a signal has no slope before its amplitude is told
   for (int i = 0; i < steps; ++i) {
-    std::vector<RunResidual::FirstOrder::Beside> of_run(runs_.size());
-    std::vector<Index> states(runs_.size(), 0);
-    Index rows = 0, columns = further;
-    for (std::size_t r = 0; r < runs_.size(); ++r) {
-      const RunResidual& run = with.runs()[r];
-      if (run.is_aside()) continue;
-      if (effect(with.model().rig(), id).acts(with.model().rig(), run.conditions())) {
-        of_run[r] = runs_[r].beside(run, theta_of(r), own, begins[r]);
-        if (!of_run[r].left.allFinite()) return i == 0 ? Promise{-INFINITY, 0} : promise;
-        states[r] = of_run[r].slopes.cols() - runs_[r].slopes().cols() - static_cast<Index>(own.size());
-      } else {
-        of_run[r] = {runs_[r].slopes(), runs_[r].left()};
-      }
-      if (i == 0) promise.largest_argument = std::max(promise.largest_argument, of_run[r].largest_argument);
-      rows += of_run[r].left.size();
-      columns += states[r];
+    const std::vector<Beside> rows = beside(with, id, own, begins);
+    if (std::any_of(rows.begin(), rows.end(), [](const Beside& run) { return !run.left.allFinite(); })) break;
+    const LinearStep to = step(of_effect, own, rows);
+    promise.share = std::max(promise.share, 1 - to.left / chi2_);
+    Index column = static_cast<Index>(joint_.unknowns().size() + of_effect.size());
+    const bool has_states = to.x.size() > column;
+    for (std::size_t r = 0; r < rows.size(); ++r) {
+      if (i == 0) promise.largest_argument = std::max(promise.largest_argument, rows[r].largest_argument);
+      const Index states = further_states(r, own, rows[r]);
+      begins[r] = to.x.segment(column, states);
+      column += states;
     }
-    MatrixXd slopes = MatrixXd::Zero(rows, columns);  // [unknowns of the fit | those of `with` that are the effect's own | states, run by run]
-    VectorXd left(rows);
-    Index row = 0, column = further;
-    for (std::size_t r = 0; r < runs_.size(); ++r) {
-      const auto& [s, l, argument] = of_run[r];
-      const Index parameters = runs_[r].slopes().cols();
-      const auto belongs = [&](const Unknown& u) { return !u.held && (u.run < 0 || u.run == static_cast<int>(r)); };
-      const auto put = [&](Index where, Index from) { slopes.col(where).segment(row, l.size()) = s.col(from); };
-      if (l.size() == 0) continue;
-      for (Index k = 0; k < known; ++k)
-        if (const Unknown& u = joint_.unknowns()[static_cast<std::size_t>(k)]; belongs(u)) put(k, u.parameter);
-      for (Index k = known; k < further && s.cols() > parameters; ++k)
-        if (const Unknown& u = with.unknowns()[static_cast<std::size_t>(k - known)]; is_own(u) && belongs(u)) put(k, parameters + (std::find(own.begin(), own.end(), u.parameter) - own.begin()));
-      for (Index k = 0; k < states[r]; ++k) put(column++, parameters + static_cast<Index>(own.size()) + k);
-      left.segment(row, l.size()) = l;
-      row += l.size();
-    }
-    const LinearStep step = linear_step(slopes, left);
-    promise.share = std::max(promise.share, 1 - step.left / chi2_);
-    if (columns == further) break;
-    column = further;
-    for (std::size_t r = 0; r < runs_.size(); ++r) {
-      begins[r] = step.x.segment(column, states[r]);
-      column += states[r];
-    }
+    if (!has_states) break;
   }
   return promise;
 }

@@ -8,12 +8,19 @@
 
 namespace unrig {
 
+/// The combination x of columns that leaves least of r, and |r - columns x|^2; columns that others can do without are left at 0.
+struct LinearStep {
+  Eigen::VectorXd x;
+  double left = 0;
+};
+LinearStep linear_step(const Eigen::MatrixXd& columns, const Eigen::VectorXd& r);
+
 /// A joint fit to first order about where it stands, against which laws that are not at work in it are held: their forces on its own trajectories, sent through the rig onto what is left of the readings.
 class FirstOrder {
  public:
   /// Looks at `joint` as long as it lives.
   explicit FirstOrder(const JointProblem& joint);
-  /// Not of a fit in which a force wanders or the model runs away.
+  /// Not of a fit in which a force wanders or the model runs away, but for runs that are set aside.
   bool known() const;
 
   struct Promise {
@@ -24,16 +31,14 @@ class FirstOrder {
   Promise promise(const JointProblem& with, const std::string& id) const;
 
  private:
+  using Beside = RunResidual::FirstOrder::Beside;
+  std::vector<Beside> beside(const JointProblem& with, const std::string& id, const std::vector<Eigen::Index>& own, const std::vector<Eigen::VectorXd>& begins) const;
+  LinearStep step(const std::vector<Unknown>& of_effect, const std::vector<Eigen::Index>& own, const std::vector<Beside>& rows) const;
+  Eigen::Index further_states(std::size_t run, const std::vector<Eigen::Index>& own, const Beside& rows) const;
+
   const JointProblem& joint_;
   std::vector<RunResidual::FirstOrder> runs_;
   double chi2_ = 0;
 };
-
-/// The combination x of columns that leaves least of r, and |r - columns x|^2; columns that others can do without are left at 0.
-struct LinearStep {
-  Eigen::VectorXd x;
-  double left = 0;
-};
-LinearStep linear_step(const Eigen::MatrixXd& columns, const Eigen::VectorXd& r);
 
 }  // namespace unrig

@@ -5,8 +5,6 @@
 #include <limits>
 #include <utility>
 
-#include <fmt/format.h>
-
 #include "core/effects/effect.h"
 #include "core/law/law_effect.h"
 #include "core/numerics/in_parallel.h"
@@ -146,18 +144,17 @@ JointProblem Screening::best_start(const JointProblem& joint, const std::string&
   return best_of(at, without_.joint.chi2());
 }
 
-/// Values, noise and c of the fit without the effects.
-Arrival Screening::transferred(const std::shared_ptr<const AeroelasticModel>& model) const {
-  Arrival arrival{model, without_.windows, make_joint(*model, problem_.runs, without_.windows, 0)};
-  for (const Unknown& known : without_.joint.unknowns()) {
-    const std::string& name = without_.joint.parameter(known).name;
+Arrival transferred(const FitProblem& problem, const Arrival& without, const std::shared_ptr<const AeroelasticModel>& model) {
+  Arrival arrival{model, without.windows, make_joint(*model, problem.runs, without.windows, 0)};
+  for (const Unknown& known : without.joint.unknowns()) {
+    const std::string& name = without.joint.parameter(known).name;
     for (Unknown& u : arrival.joint.unknowns())
       if (u.run == known.run && arrival.joint.parameter(u).name == name) u.value = known.value;
   }
   const VectorXd anywhere = model->start_values();
   for (std::size_t r = 0; r < arrival.joint.runs().size(); ++r) {
     RunResidual& run = arrival.joint.runs()[r];
-    const RunResidual& known = without_.joint.runs()[r];
+    const RunResidual& known = without.joint.runs()[r];
     run.keep_noise_of(known);
     run.start_from(known);
     run.follow_in(known.finer());
@@ -167,7 +164,7 @@ Arrival Screening::transferred(const std::shared_ptr<const AeroelasticModel>& mo
 }
 
 Screening::Extended Screening::extend(const std::shared_ptr<const AeroelasticModel>& model, const std::vector<std::string>& added) const {
-  Extended extended{transferred(model)};
+  Extended extended{transferred(problem_, without_, model)};
   JointProblem& joint = extended.arrival.joint;
   glance(joint, true);
   JointProblem looked_at = at_the_rig_ ? back_at_the_rig(joint) : joint;

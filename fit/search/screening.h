@@ -37,7 +37,6 @@ class Screening {
     ResidualLines lines;
   };
   const Base& judge() const { return at_the_rig_ ? *at_the_rig_ : base_; }
-  Arrival transferred(const std::shared_ptr<const AeroelasticModel>& model) const;
   bool is_law(const JointProblem& joint, const std::string& id) const;
   double largest_argument_of_readings(const JointProblem& joint) const;
   std::vector<Eigen::VectorXd> starts_of(JointProblem& joint, const std::string& id) const;
@@ -49,6 +48,9 @@ class Screening {
   std::unique_ptr<const Base> at_the_rig_;          // where parameters of the fit have gone astray: what a rig moves by there says nothing of the size of a force
   std::optional<BesideUnknownForces> beside_;  // then, where there are decays
 };
+
+/// With `model`, the one of other effects: values, noise and c of the fit `without` them where it has them.
+Arrival transferred(const FitProblem& problem, const Arrival& without, const std::shared_ptr<const AeroelasticModel>& model);
 
 /// Share of chi-square, `before`, that one linear step in all unknowns removes.
 double promised_share(const JointProblem& joint, double before);
