@@ -111,7 +111,8 @@ std::optional<RigDescription> describe_rig(const DiagnoseProblem& problem, const
   const double promised = inexact.promises(arrival) / (arrival.joint.chi2() - freedom);
   if (!(promised > least)) return {};
 
-  inexact.search(arrival);
+  constexpr double worth_a_step = 0.01;  // of what is left: numbers that explain it are found in steps that promise far more
+  inexact.search(arrival, worth_a_step);
   auto moved = std::make_shared<FitProblem>();
   moved->rig = inexact.rig();
   moved->runs = inexact.runs();

@@ -105,7 +105,7 @@ std::vector<FittedGiven> InexactRig::numbers() const {
   return numbers;
 }
 
-void InexactRig::search(Arrival& arrival) {
+void InexactRig::search(Arrival& arrival, double worth) {
   constexpr int most = 12, most_halvings = 6;
   constexpr double near = 0.05;
   const auto tell = [&](const std::string& what) {
@@ -115,8 +115,9 @@ void InexactRig::search(Arrival& arrival) {
     tell("looking at the stated uncertainties");
     slopes_ = number_slopes(arrival, numbers_, z_);  // anew: masses and stiffness move the runs alike to one part in thousands, and so must their slopes agree
     const Step step = next_step(arrival);
-    if (step.length < near) return;
-    const double before = arrival.joint.chi2() + z_.squaredNorm(), promised = step.length * step.length;
+    const double promised = step.length * step.length, excess = arrival.joint.chi2() * (1 - 1 / arrival.reduced_chi2());
+    if (step.length < near || promised < worth * excess) return;
+    const double before = arrival.joint.chi2() + z_.squaredNorm();
     bool better = false;
     for (double part = 1; !better && part > std::pow(0.5, most_halvings); part /= 2) {
       try {

@@ -24,8 +24,9 @@ class InexactRig {
 
   /// How far chi-square + z^T z would fall by one step in parameters and deviations from a fit at the present numbers, were both linear.
   double promises(const Arrival& arrival);
-  /// From a fit at the present numbers (at first the stated ones) to the best of both. The runs of `arrival` are this object's from then on.
-  void search(Arrival& arrival);
+  /// From a fit at the present numbers (at first the stated ones) to the best of both. The runs of `arrival` are this object's from then on. It ends, too, where a step promises
+  /// less than `worth` of what is left above the noise.
+  void search(Arrival& arrival, double worth = 0);
 
   /// Rig, runs and numbers as they stand at the end of a search; errors of the numbers as stated.
   Rig rig() const { return numbers_.rig_at(z_); }
