@@ -69,18 +69,23 @@ RunResidual::FirstOrder::FirstOrder(const RunResidual& run, const VectorXd& thet
   left_ << left.head(triangle.rows()), left.tail(left.size() - triangle.rows()).norm();
 }
 
-/// c of this run where the other model's unknowns stand, nothing in states that only that model has.
-VectorXd RunResidual::FirstOrder::as_other_has_it(const RunResidual& other) const {
-  VectorXd linear = VectorXd::Zero(other.unknowns_);
-  linear.head(run_.motion_.unknowns()) = linear_.head(run_.motion_.unknowns());
-  const Index behind = run_.unknowns_ - run_.first_offset_;
-  linear.tail(behind) = linear_.tail(behind);
-  for (std::size_t i = 0; i < run_.free_.size(); ++i) {
-    const Index state = run_.free_[i] < run_.states_ ? run_.free_[i] : run_.free_[i] - run_.states_ + other.states_;  // filters stand behind the model's states
+VectorXd RunResidual::FirstOrder::as_other_has_it(const RunResidual& run, const VectorXd& linear, const RunResidual& other) {
+  VectorXd c = VectorXd::Zero(other.unknowns_);
+  c.head(run.motion_.unknowns()) = linear.head(run.motion_.unknowns());
+  const Index behind = run.unknowns_ - run.first_offset_;
+  c.tail(behind) = linear.tail(behind);
+  for (std::size_t i = 0; i < run.free_.size(); ++i) {
+    const bool is_of_model = run.free_[i] < run.states_;
+    const Index state = is_of_model ? run.free_[i] : run.free_[i] - run.states_ + other.states_;  // filters stand behind the model's states
     const auto there = std::find(other.free_.begin(), other.free_.end(), state);
-    if (there != other.free_.end()) linear[other.first_state_ + (there - other.free_.begin())] = linear_[run_.first_state_ + static_cast<Index>(i)];
+    if (there != other.free_.end() && is_of_model == (state < other.states_)) c[other.first_state_ + (there - other.free_.begin())] = linear[run.first_state_ + static_cast<Index>(i)];
   }
-  return linear;
+  return c;
+}
+
+void RunResidual::FirstOrder::start(RunResidual& other, const RunResidual& run) {
+  const bool is_alike = run.motion_.unknowns() == other.motion_.unknowns() && run.unknowns_ - run.first_offset_ == other.unknowns_ - other.first_offset_;
+  if (is_alike && run.last_linear_.size() == run.unknowns_) other.start_from(as_other_has_it(run, run.last_linear_, other));
 }
 
 RunResidual::FirstOrder::Beside RunResidual::FirstOrder::beside(const RunResidual& other, const VectorXd& theta, const std::vector<Index>& parameters, const VectorXd& begins) const {
@@ -92,7 +97,7 @@ RunResidual::FirstOrder::Beside RunResidual::FirstOrder::beside(const RunResidua
   for (const Index state : other.free_)
     if (state >= run_.states_ && state < other.states_) further.push_back(state);
   const auto count = static_cast<Index>(further.size());
-  VectorXd linear = as_other_has_it(other);
+  VectorXd linear = as_other_has_it(run_, linear_, other);
   for (Index i = 0; i < begins.size(); ++i) linear[other.first_state_ + (std::find(other.free_.begin(), other.free_.end(), further[static_cast<std::size_t>(i)]) - other.free_.begin())] = begins[i];
   NonlinearDrive from{other.initial_state(linear, n), other.whole_jerk(linear), other.inputs_, MatrixXd::Zero(n, count), {}};
   MatrixXd start = MatrixXd::Zero(n + other.filter_states(), count + all);

@@ -29,11 +29,14 @@ class RunResidual::FirstOrder {
   /// `other`: the same run with the states of this model and further ones behind them. `parameters`: of its theta. `begins`: further states that begin unknown, where they do; empty: at 0.
   Beside beside(const RunResidual& other, const Eigen::VectorXd& theta, const std::vector<Eigen::Index>& parameters, const Eigen::VectorXd& begins = {}) const;
 
+  /// c of `run` where the unknowns of the same run held against another model stand, which has further states or fewer behind those that both have: 0 for what only `other` has.
+  static Eigen::VectorXd as_other_has_it(const RunResidual& run, const Eigen::VectorXd& linear, const RunResidual& other);
+  /// Starts the search for c in `other` from the last one that was searched in `run`, where there is one.
+  static void start(RunResidual& other, const RunResidual& run);
+
  private:
   Eigen::MatrixXd weighted(const Eigen::MatrixXd& rows) const;
   Eigen::MatrixXd beside_c(const Eigen::MatrixXd& rows) const;
-  Eigen::VectorXd as_other_has_it(const RunResidual& other) const;
-
   const RunResidual& run_;
   std::shared_ptr<const Linearised> model_;
   Eigen::VectorXd linear_;                            // c

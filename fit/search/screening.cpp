@@ -156,7 +156,7 @@ Arrival transferred(const FitProblem& problem, const Arrival& without, const std
     RunResidual& run = arrival.joint.runs()[r];
     const RunResidual& known = without.joint.runs()[r];
     run.keep_noise_of(known);
-    run.start_from(known);
+    RunResidual::FirstOrder::start(run, known);
     run.follow_in(known.finer());
     run.set_aside(known.is_aside() && run.takes_small_steps(anywhere));
   }
