@@ -126,6 +126,35 @@ TEST(FirstOrder, IsTheRunsOwnEvaluation) {
   }
 }
 
+/// c goes over to a model with two states more, behind those that both have, and comes back as it was.
+TEST(FirstOrder, LinearUnknownsGoOverToAModelWithFurtherStates) {
+  const JointProblem& joint = baseline().arrival.joint;
+  const JointProblem with = transferred(campaign(), baseline().arrival, model_with("tank-wave")).joint;
+  for (std::size_t r = 1; r < joint.runs().size(); ++r) {  // there are no waves in air
+    const RunResidual &run = joint.runs()[r], &other = with.runs()[r];
+    ASSERT_EQ(other.linear_unknowns(), run.linear_unknowns() + 2);
+    const VectorXd c = run.predict(joint.theta(r)).linear, there = RunResidual::FirstOrder::as_other_has_it(run, c, other);
+    const Index offsets = run.linear_unknowns() - run.first_offset();
+    EXPECT_EQ(there.tail(offsets), c.tail(offsets));
+    EXPECT_EQ((there.array() == 0).count(), (c.array() == 0).count() + 2);
+    EXPECT_EQ(RunResidual::FirstOrder::as_other_has_it(other, there, run), c);
+  }
+}
+
+/// Beside a strong law a search for c in two steps, a glance, needs the c of the fit without the effect: from that of the rig without the law it ends elsewhere.
+TEST(Screening, ANonlinearRunBeginsWhereTheFitWithoutTheEffectStands) {
+  FitProblem problem = campaign();
+  problem.runs.resize(2);
+  Trial drag = prepare(problem, fit_baseline(problem), {"quadratic-drag"});
+  unknowns_of(drag.arrival.joint, "quadratic-drag").front()->value = 20;
+  const double chi2 = drag.arrival.joint.chi2();
+  const auto both = std::make_shared<const AeroelasticModel>(model_of(problem.rig, problem.runs, problem.circulation, {"quadratic-drag", "tank-wave"}));
+  const JointProblem with = Screening(problem, drag.arrival).extend(both, {"tank-wave"}).arrival.joint;
+  JointProblem glance = with;
+  for (RunResidual& run : glance.runs()) run.glance(true);
+  EXPECT_LT(glance.chi2(), 1.001 * chi2);
+}
+
 TEST(FirstOrder, StepAlongColumnsThatAreAlike) {
   const MatrixXd columns = (MatrixXd(3, 2) << 1, 2, 0, 0, 0, 0).finished();  // one direction, twice
   const LinearStep step = linear_step(columns, Eigen::Vector3d(3, 4, 0));
