@@ -1,138 +1,25 @@
 #include "fit/search/effect_search.h"
 
-#include <Eigen/QR>
-#include <Eigen/SVD>
 #include <algorithm>
 #include <cmath>
 
 #include "core/effects/effect.h"
 #include "core/law/law_effect.h"
 #include "core/numerics/in_parallel.h"
-#include "core/numerics/spectrum.h"
 #include "fit/search/decays_first.h"
 #include "fit/fit.h"
 #include "fit/fit_description.h"
 #include "fit/search/find_motion.h"
+#include "fit/search/left_of_runs.h"
 #include "fit/search/own_parameters.h"
 #include "fit/likelihood/readings_noise.h"
-#include "fit/likelihood/standardised_residual.h"
 #include "fit/uncertainty/undetermined.h"
 
 namespace unrig {
 namespace {
 
 using Eigen::Index;
-using Eigen::MatrixXd;
 using Eigen::VectorXd;
-
-/// Share of a residual's samples that its colour leaves independent: the flatness of its spectrum, 1 for white noise.
-double independent_share(const VectorXd& left) {
-  const VectorXd power = fourier(left).cwiseAbs2();
-  const double mean = power.mean();
-  return mean > 0 ? std::min(1.0, 2 * mean * mean / power.cwiseAbs2().mean()) : 1;  // the lines of white noise are exponentially distributed
-}
-
-constexpr double run_away = 1e30;  // variance of a run whose model does not stay finite: infinite, but two of them can be compared
-
-/// What the present fit leaves of a run.
-struct LeftOfRun {
-  double variance = 0;     // residual power over noise power
-  double samples = 0;
-  double independent = 0;  // of them, as the residual's colour says
-  double angle_variance = 1, angle_samples = 0;
-  Index unknowns = 0;      // linear ones that its readings tell of
-};
-
-/// What the readings say of some of the linear unknowns c, whatever the others are: residual = triangle (c - estimate).
-struct Known {
-  MatrixXd triangle;
-  VectorXd estimate;
-};
-Known known_of(const RunResidual::Prediction& p, const std::vector<Index>& some) {
-  std::vector<Index> order;
-  for (Index i = 0; i < p.linear.size(); ++i)
-    if (std::find(some.begin(), some.end(), i) == some.end()) order.push_back(i);
-  order.insert(order.end(), some.begin(), some.end());
-  const auto count = static_cast<Index>(some.size());
-  const MatrixXd triangle = Eigen::HouseholderQR<MatrixXd>(p.linear_factor(Eigen::all, order)).matrixQR().triangularView<Eigen::Upper>();
-  return {triangle.block(p.linear.size() - count, p.linear.size() - count, count, count), p.linear(some)};
-}
-
-/// Places in c of those of these states that are unknown where the run begins.
-std::vector<Index> places_of(const RunResidual& run, const std::vector<Index>& states) {
-  std::vector<Index> places;
-  for (std::size_t i = 0; i < run.free_states().size(); ++i)
-    if (std::find(states.begin(), states.end(), run.free_states()[i]) != states.end()) places.push_back(run.motion().unknowns() + static_cast<Index>(i));
-  return places;
-}
-
-/// Linear unknowns of a run that count. Of the states in which filters of the gauge start, those combinations that the readings know better than the swing of the reading itself tells: what a fast filter was
-/// in has died out before a sample shows it. Of the parts of a signal (LinearSystem::parts) those without which the evidence were less: what the others take of chi-square is left of the run instead.
-void count_unknowns(const RunResidual& run, const VectorXd& theta, const RunResidual::Prediction& p, double log_samples, LeftOfRun& left) {
-  left.unknowns = run.linear_unknowns();
-  const LinearSystem system = run.model().system(run.conditions(), theta, run.channels());
-  if (const std::vector<Index> filters = places_of(run, system.settling); !filters.empty()) {
-    const VectorXd reading = p.output.col(0).array() - p.output.col(0).mean();
-    const double swing = reading.norm() / std::sqrt(static_cast<double>(reading.size()));
-    const VectorXd told = swing * Eigen::JacobiSVD<MatrixXd>(known_of(p, filters).triangle).singularValues();
-    left.unknowns -= static_cast<Index>(filters.size()) - (told.array() > 1).count();
-  }
-  for (const std::vector<Index>& part : system.parts) {  // each by itself: at frequencies apart they are all but orthogonal
-    const std::vector<Index> places = places_of(run, part);
-    const Known known = known_of(p, places);
-    const double takes = (run.tempered() * (known.triangle * known.estimate)).squaredNorm(), costs = static_cast<double>(places.size()) * log_samples;
-    if (takes > costs) continue;
-    left.unknowns -= static_cast<Index>(places.size());
-    left.variance += takes / left.samples;
-  }
-}
-
-/// A law that is missing bends the motion too, within the noise of the angle.
-void look_at_angle(const RunResidual& run, const RunResidual::Prediction& p, LeftOfRun& left) {
-  if (run.motion().unknowns() == 0) return;
-  const VectorXd& angle = run.run().channel("alpha").value;
-  double power = 0;
-  for (Index k = 0; k < angle.size(); ++k) {
-    if (!(run.angle_weight()[k] > 0) || !std::isfinite(angle[k])) continue;
-    power += std::pow(run.angle_weight()[k] * (angle[k] - p.motion.angle[k] - p.angle_offset[0]), 2);
-    ++left.angle_samples;
-  }
-  left.angle_variance = power / left.angle_samples;
-}
-
-std::vector<LeftOfRun> left_of_runs(const JointProblem& joint) {
-  std::vector<LeftOfRun> all(joint.runs().size());
-  double of_all = 0;
-  for (const RunResidual& run : joint.runs()) of_all += static_cast<double>(run.run().samples());
-  const double log_samples = std::log(of_all);
-  in_parallel(all.size(), [&](std::size_t r) {
-    const RunResidual& run = joint.runs()[r];
-    const auto every_sample = static_cast<double>(run.run().samples());
-    if (run.is_aside()) {
-      all[r] = {1, every_sample, every_sample};
-      all[r].unknowns = run.linear_unknowns();
-      return;
-    }
-    const RunResidual::Prediction p = run.predict(joint.theta(r));
-    if (!p.output.allFinite()) {
-      all[r] = {run_away, every_sample, every_sample};
-      all[r].unknowns = run.linear_unknowns();
-      return;
-    }
-    double power = 0;
-    for (std::size_t c = 0; c < p.channels.size(); ++c) {
-      const VectorXd left = standardised_residual(run, joint.theta(r), p, c);
-      const auto samples = static_cast<double>((left.array() != 0).count());
-      power += left.squaredNorm();
-      all[r].samples += samples;
-      all[r].independent += independent_share(left) * samples;
-    }
-    all[r].variance = power / all[r].samples;
-    look_at_angle(run, p, all[r]);
-    count_unknowns(run, joint.theta(r), p, log_samples, all[r]);
-  });
-  return all;
-}
 
 /// Weights of the runs such that each is left with about the power of its noise; true where that changed any by more than a tenth.
 bool temper(JointProblem& joint) {
