@@ -37,12 +37,13 @@ class RunResidual::FirstOrder {
  private:
   Eigen::MatrixXd weighted(const Eigen::MatrixXd& rows) const;
   Eigen::MatrixXd beside_c(const Eigen::MatrixXd& rows) const;
+
   const RunResidual& run_;
   std::shared_ptr<const Linearised> model_;
-  Eigen::VectorXd linear_;                            // c
-  Eigen::VectorXd angle_left_;                        // of the rows that tell of the angle
+  Eigen::VectorXd linear_;                               // c
+  Eigen::VectorXd angle_left_;                           // of the rows that tell of the angle
   std::shared_ptr<const run_rows::Eliminator> columns_;  // what c does
-  Householder in_theta_;                              // what theta does beside it
+  Householder in_theta_;                                 // what theta does beside it
   Eigen::MatrixXd slopes_;
   Eigen::VectorXd left_;
 };

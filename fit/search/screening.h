@@ -45,7 +45,7 @@ class Screening {
   const FitProblem& problem_;
   const Arrival& without_;
   Base base_;
-  std::unique_ptr<const Base> at_the_rig_;          // where parameters of the fit have gone astray: what a rig moves by there says nothing of the size of a force
+  std::unique_ptr<const Base> at_the_rig_;     // where parameters of the fit have gone astray: what a rig moves by there says nothing of the size of a force
   std::optional<BesideUnknownForces> beside_;  // then, where there are decays
 };
 
