@@ -15,6 +15,7 @@ namespace unrig {
 enum class Symbol : std::uint8_t { x, v, a, theta, theta_rate, twist, twist_rate, alpha, U, t, z };
 constexpr std::size_t symbol_count = 11;
 constexpr std::array<std::string_view, symbol_count> symbol_names{"x", "v", "a", "theta", "theta_rate", "twist", "twist_rate", "alpha", "U", "t", "z"};
+constexpr std::array<const char*, symbol_count> symbol_units{"m", "m/s", "m/s^2", "rad", "rad/s", "rad", "rad/s", "rad", "m/s", "s", "1"};
 
 /// Text that is no expression: what was found, where, what was wanted instead, and what to do about it (may be empty).
 struct ExpressionError : std::runtime_error {

@@ -18,7 +18,6 @@ namespace {
 
 constexpr std::size_t most_parameters = most_law_parameters;
 constexpr std::pair<ActsOn, const char*> places[] = {{ActsOn::normal, "normal"}, {ActsOn::torsion, "torsion"}, {ActsOn::lift, "lift"}, {ActsOn::gauge, "gauge"}, {ActsOn::mount, "mount"}};
-constexpr std::array<const char*, symbol_count> symbol_units{"m", "m/s", "m/s^2", "rad", "rad/s", "rad", "rad/s", "rad", "m/s", "s", "1"};
 
 constexpr double unbounded = 1e30;
 
@@ -117,20 +116,43 @@ std::vector<Parameter> read_parameters(const TomlTable& file, const std::vector<
   return parameters;
 }
 
+/// The symbol that a key of the table [in] names, one that the law uses.
+std::size_t symbol_of(const TomlTable& table, const std::string& name, const char* in, const Law& law) {
+  const auto found = std::find(symbol_names.begin(), symbol_names.end(), name);
+  if (found == symbol_names.end()) table.fail(name, fmt::format("\"{}\" in [{}] is no symbol", name, in), fmt::format("wanted one of {}", fmt::join(symbol_names, " ")));
+  const auto s = static_cast<std::size_t>(found - symbol_names.begin());
+  if (!law.uses(static_cast<Symbol>(s))) table.fail(name, fmt::format("{} in [{}], which the law does not use", name, in), "wanted only symbols in `force` and `memory`", "Leave it out.");
+  return s;
+}
+
 std::array<double, symbol_count> read_scales(const TomlTable& file, const Law& law) {
   std::array<double, symbol_count> scales{};
   scales.fill(1);
   if (!file.has("scales")) return scales;
   const TomlTable table = file.table("scales");
   for (const std::string& name : table.keys()) {
-    const auto found = std::find(symbol_names.begin(), symbol_names.end(), name);
-    const auto s = static_cast<std::size_t>(found - symbol_names.begin());
-    if (found == symbol_names.end()) table.fail(name, fmt::format("\"{}\" in [scales] is no symbol", name), fmt::format("wanted one of {}", fmt::join(symbol_names, " ")));
+    const std::size_t s = symbol_of(table, name, "scales", law);
     if (static_cast<Symbol>(s) == Symbol::z) table.fail(name, "a scale of the memory", "wanted none: z has no dimension");
-    if (!law.uses(static_cast<Symbol>(s))) table.fail(name, fmt::format("a scale of {}, which the law does not use", name), "wanted only scales of symbols in `force` and `memory`", "Leave it out.");
     scales[s] = table.positive_quantity(name, symbol_units[s]);
   }
   return scales;
+}
+
+LearntOn read_learnt_on(const TomlTable& file, const Law& law) {
+  LearntOn learnt_on;
+  if (!file.has("learnt_on")) return learnt_on;
+  const TomlTable table = file.table("learnt_on");
+  for (const std::string& name : table.keys()) {
+    const std::size_t s = symbol_of(table, name, "learnt_on", law);
+    if (static_cast<Symbol>(s) == Symbol::z) table.fail(name, "a range of the memory", "wanted none: z is where the other symbols take it", "Leave it out.");
+    const std::vector<std::string> ends = table.texts(name);
+    if (ends.size() != 2) table.fail(name, fmt::format("{} has {} value{}", table.full_name(name), ends.size(), ends.size() == 1 ? "" : "s"), "wanted two, the lowest and the highest", fmt::format("For instance [\"-1 {0}\", \"1 {0}\"].", symbol_units[s]));
+    const auto in_si = [&](const std::string& text) { return quantity(text, symbol_units[s], table.place(name), table.full_name(name)); };
+    const Range range{in_si(ends[0]), in_si(ends[1])};
+    if (!(range.lower <= range.upper)) table.fail(name, fmt::format("{} was learnt from {:g} to {:g} {}", name, range.lower, range.upper, symbol_units[s]), "wanted the lowest value first", "Exchange the two.");
+    learnt_on.emplace(static_cast<Symbol>(s), range);
+  }
+  return learnt_on;
 }
 
 void check_memory(const TomlTable& file, const Law& law) {
@@ -158,6 +180,16 @@ void check_rest(const TomlTable& file, const Law& law) {
   if (law.memory) check(*law.memory, "memory");
 }
 
+std::string learnt_text(const LearntOn& learnt_on) {
+  if (learnt_on.empty()) return "";
+  std::string text = "[learnt_on]\n";
+  for (const auto& [symbol, range] : learnt_on) {
+    const auto s = static_cast<std::size_t>(symbol);
+    text += fmt::format("{0} = [\"{1} {3}\", \"{2} {3}\"]\n", symbol_names[s], range.lower, range.upper, symbol_units[s]);
+  }
+  return text;
+}
+
 /// A value as a law file has it, in the fewest digits that read back as the same number.
 std::string quantity(double value, const std::string& unit) { return unit == "1" ? fmt::format("{}", value) : fmt::format("\"{} {}\"", value, unit); }
 
@@ -180,7 +212,8 @@ std::string law_text(const Law& law) {
   std::string scales;
   for (std::size_t s = 0; s < symbol_count; ++s)
     if (law.scales[s] != 1) scales += fmt::format("{} = {}\n", symbol_names[s], quantity(law.scales[s], symbol_units[s]));
-  return scales.empty() ? text : text + "[scales]\n" + scales;
+  if (!scales.empty()) text += "[scales]\n" + scales;
+  return text + learnt_text(law.learnt_on);
 }
 
 std::string Law::id() const {
@@ -219,7 +252,7 @@ std::string Law::kind() const {
 Law parse_law(const std::string& text, const std::string& file) {
   const TomlTable table = TomlTable::parse(text, file, "A law file is described in the manual, laws.md.");
   if (!table.has("unrig_law") || table.integer("unrig_law") != 1) table.fail("unrig_law", "no unrig_law = 1", "wanted a law file of version 1", "Begin the file with unrig_law = 1.");
-  table.allow_only({"unrig_law", "name", "acts_on", "force", "memory", "parameters", "scales"});
+  table.allow_only({"unrig_law", "name", "acts_on", "force", "memory", "parameters", "scales", "learnt_on"});
   Law law;
   law.file = file;
   law.text = text;
@@ -256,6 +289,7 @@ Law parse_law(const std::string& text, const std::string& file) {
   for (std::size_t s = 0; s < symbol_count; ++s) looks = looks || law.force.uses(static_cast<Symbol>(s));
   if (!looks) table.fail("force", "a force that is always the same", "wanted one that depends on a symbol", "A constant load is part of the steady load, which is fitted anyhow.");
   law.scales = read_scales(table, law);
+  law.learnt_on = read_learnt_on(table, law);
   law.force.divide_by(law.scales);
   if (law.memory) law.memory->divide_by(law.scales);
   check_rest(table, law);

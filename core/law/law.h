@@ -1,5 +1,6 @@
 #pragma once
 #include <array>
+#include <map>
 #include <optional>
 #include <string>
 #include <vector>
@@ -13,6 +14,9 @@ namespace unrig {
 enum class ActsOn { normal, torsion, lift, gauge, mount };
 std::string to_string(ActsOn place);
 
+/// Between which values the symbols lay in the recordings that a law was learnt on, in SI; of a symbol that is not there nothing is known.
+using LearntOn = std::map<Symbol, Range>;
+
 /// A law as a user wrote it down (correct/manual/laws.md).
 struct Law {
   std::string file;  ///< for messages
@@ -24,6 +28,7 @@ struct Law {
   Expression force;                   ///< over the symbols in SI and these parameters
   std::optional<Expression> memory;   ///< z' [1/s]; z is 0 where a run begins
   std::array<double, symbol_count> scales{};
+  LearntOn learnt_on;  ///< beyond it the law is a guess (core/law/learnt_range.h); empty: anywhere goes
 
   /// "law:" and the name, letters, digits, blanks and - as they are.
   std::string id() const;
@@ -46,10 +51,12 @@ struct Law {
 ///     p = { start = 1.5, lower = 0.2, upper = 6 }
 ///     [scales]                                 # symbols are divided by these
 ///     v = "0.1 m/s"
+///     [learnt_on]                              # where the recordings went that it was learnt on, optional
+///     v = ["-0.3 m/s", "0.28 m/s"]
 Law read_law(const std::string& path);
 /// The same from its text.
 Law parse_law(const std::string& text, const std::string& file);
-/// A law file of these formulas, parameters and scales; what parse_law reads from it says the same as `law`.
+/// A law file of these formulas, parameters, scales and where it was learnt; what parse_law reads from it says the same as `law`.
 std::string law_text(const Law& law);
 
 }  // namespace unrig

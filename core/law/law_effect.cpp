@@ -8,6 +8,7 @@
 
 #include <fmt/format.h>
 
+#include "core/law/law_view.h"
 #include "core/propagate/feedback_force.h"
 
 namespace unrig {
@@ -17,16 +18,9 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::RowVectorXd;
 
-using Symbols = std::array<double, symbol_count>;
+using Symbols = LawView::Symbols;
 
 std::size_t at(Symbol symbol) { return static_cast<std::size_t>(symbol); }
-
-/// What the symbols are at one place: their values at rest where the run begins, and the rows over the states that add to them; empty where they stay.
-struct View {
-  Symbols at_rest{};
-  std::array<RowVectorXd, symbol_count> row;
-  RowVectorXd moves;  // over the coordinates: by how much they move the place
-};
 
 /// An expression as the law of a feedback: of the arguments that it looks at.
 struct Seen {
@@ -82,7 +76,7 @@ class LawAtWork {
       case ActsOn::normal: return act_through(port(system_, c_.ports.coordinate, first_mode(c_.model, system_.coordinates)[0]), -1);
       case ActsOn::torsion: {
         const Basis& basis = c_.model.basis();
-        if (basis.torsion_modes > 0) act_through(port(system_, c_.ports.coordinate + basis.normal_modes, section_twist()[basis.normal_modes]), -1);
+        if (basis.torsion_modes > 0) act_through(port(system_, c_.ports.coordinate + basis.normal_modes, section_twist(c_.model, system_.coordinates)[basis.normal_modes]), -1);
         return;
       }
       case ActsOn::lift:
@@ -110,7 +104,7 @@ class LawAtWork {
 
   void act_by(Push push, Index strip) {
     Expression force = law_.force;
-    View view = view_of(strip);
+    LawView view = view_of(strip);
     if (const auto split = force.uses(Symbol::a) ? constant_share(force, Symbol::a) : std::nullopt) {
       push = add_mass(push, view, factor_of(split->factor, view));
       force = split->rest;
@@ -121,42 +115,15 @@ class LawAtWork {
     append_input(push, feedback_of(force, view, counts_from_rest));
   }
 
-  View view_of(Index strip) const {
-    View view;
-    const Rig& rig = c_.model.rig();
-    const Basis& basis = c_.model.basis();
-    const double U = c_.conditions.speed;
-    view.moves = strip < 0 ? first_mode(c_.model, system_.coordinates) : RowVectorXd(basis.normal.row(rig.submerged[static_cast<std::size_t>(strip)] - 1));
-    const auto set = [&](Symbol s, double rest, const RowVectorXd& row) {
-      view.at_rest[at(s)] = rest;
-      view.row[at(s)] = row;
-    };
-    set(Symbol::x, 0, displacement_of(system_, view.moves));
-    set(Symbol::v, 0, rate_of(system_, view.moves));
-    set(Symbol::a, 0, rate_of(system_, view.moves));  // over the states' rates
-    set(Symbol::U, U, {});
-    if (clock_ >= 0) set(Symbol::t, 0, state(clock_));
-    if (rig.is_modal()) return view;
-    const RowVectorXd twist = strip < 0 ? section_twist() : strip_twist(strip);
-    set(Symbol::twist, 0, displacement_of(system_, twist));
-    set(Symbol::twist_rate, 0, rate_of(system_, twist));
-    set(Symbol::theta, c_.conditions.onset_angle, system_.motion >= 0 ? state(system_.motion) : RowVectorXd());
-    set(Symbol::theta_rate, 0, system_.motion >= 0 ? state(system_.motion + 1) : RowVectorXd());
-    if (U > 0) set(Symbol::alpha, c_.conditions.onset_angle, angle_of_attack(system_, c_.model, U, strip));
+  LawView view_of(Index strip) const {
+    LawView view = law_view(c_.model, system_, c_.conditions, strip);
+    if (clock_ >= 0) view.row[at(Symbol::t)] = state(clock_);
     return view;
   }
 
   RowVectorXd state(Index index) const { return RowVectorXd::Unit(system_.states(), index); }
 
-  /// Of the outermost strip in the first torsional mode, over the coordinates.
-  RowVectorXd section_twist() const {
-    const Basis& basis = c_.model.basis();
-    const RowVectorXd none = RowVectorXd::Zero(system_.coordinates);
-    return basis.torsion_modes > 0 ? RowVectorXd(basis.twist(c_.model.rig().submerged.back() - 1, basis.normal_modes) * RowVectorXd::Unit(system_.coordinates, basis.normal_modes)) : none;
-  }
-  RowVectorXd strip_twist(Index strip) const { return c_.model.basis().twist.row(c_.model.rig().submerged[static_cast<std::size_t>(strip)] - 1); }
-
-  Feedback feedback_of(const Expression& expression, const View& view, bool counts_from_rest) const {
+  Feedback feedback_of(const Expression& expression, const LawView& view, bool counts_from_rest) const {
     Seen seen{std::make_shared<const Expression>(expression), view.at_rest, {}, law_.parameters.size(), counts_from_rest};
     for (std::size_t s = 0; s < symbol_count; ++s)
       if (expression.uses(static_cast<Symbol>(s)) && view.row[s].size() > 0) seen.symbol.push_back(s);
@@ -174,7 +141,7 @@ class LawAtWork {
   }
 
   /// A factor of parameters and the speed, 1 x 1.
-  DualMatrix factor_of(const Expression& factor, const View& view) const {
+  DualMatrix factor_of(const Expression& factor, const LawView& view) const {
     Symbols in_symbols;
     std::array<double, most_law_parameters> partial{};
     DualMatrix value(MatrixXd::Constant(1, 1, factor(view.at_rest.data(), p_, in_symbols.data(), partial.data())), c_.theta.size());
@@ -184,7 +151,7 @@ class LawAtWork {
   }
 
   /// f = factor a, a = r x' with f in x' too. Returns what a unit of another force does now that it moves the mass too.
-  Push add_mass(const Push& push, const View& view, const DualMatrix& factor) {
+  Push add_mass(const Push& push, const LawView& view, const DualMatrix& factor) {
     const MatrixXd r = rate_of(system_, view.moves);  // reads velocities out of the states, accelerations out of their rates
     const DualMatrix own = r * push.states;
     const DualMatrix answer = solve(DualMatrix(MatrixXd::Ones(1, 1), c_.theta.size()) - factor * own, factor);
@@ -197,7 +164,7 @@ class LawAtWork {
   }
 
   /// z and what it drives; returns the force that is left, which may see z.
-  Expression add_memory(Push& push, View& view, Expression force) {
+  Expression add_memory(Push& push, LawView& view, Expression force) {
     const Index memory = append_state();
     push.states = push.states.grown(memory + 1, 1);
     if (const auto split = constant_share(force, Symbol::z)) {

@@ -142,9 +142,17 @@ TEST(LawFile, SaysWhatIsWrongAndWhere) {
       {file_of("-c * z", c, "memory = \"v + a\"\n"), "the acceleration a in `memory`"},
       {file_of("-c", c), "a force that is always the same"},
       {file_of("-c * x", c, "", "nowhere"), "wanted one of normal, torsion, lift, gauge, mount"},
-      {file_of("-c * x", c) + "[scales]\nv = \"1 m/s\"\n", "a scale of v, which the law does not use"},
+      {file_of("-c * x", c) + "[scales]\nv = \"1 m/s\"\n", "v in [scales], which the law does not use"},
       {file_of("-c * x", c) + "[scales]\nx = \"0 m\"\n", "wanted a value above zero"},
       {file_of("-c * x", c) + "[scales]\nx = \"1 m/s\"\n", "scales.x"},
+      {file_of("-c * x", c) + "[learnt_on]\nv = [\"0 m/s\", \"1 m/s\"]\n", "law.toml:8: v in [learnt_on], which the law does not use"},
+      {file_of("-c * x", c) + "[learnt_on]\nw = [\"0 m\", \"1 m\"]\n", "law.toml:8: \"w\" in [learnt_on] is no symbol; wanted one of x v a"},
+      {file_of("-c * x", c) + "[learnt_on]\nx = [\"0 m/s\", \"1 m\"]\n", "law.toml:8: learnt_on.x has the unit \"m/s\""},
+      {file_of("-c * x", c) + "[learnt_on]\nx = [\"5 mm\", \"-4 mm\"]\n", "law.toml:8: x was learnt from 0.005 to -0.004 m; wanted the lowest value first"},
+      {file_of("-c * x", c) + "[learnt_on]\nx = [\"5 mm\"]\n", "law.toml:8: learnt_on.x has 1 value; wanted two"},
+      {file_of("-c * x", c) + "[learnt_on]\nx = [-4, 5]\n", "wanted text in double quotes"},
+      {file_of("-c * x", c) + "[learnt_on]\nx = \"5 mm\"\n", "learnt_on.x"},
+      {file_of("-c * x * z", c, "memory = \"v - z\"\n") + "[learnt_on]\nz = [\"0\", \"1\"]\n", "a range of the memory"},
       {file_of(std::string(200, '('), c), "nested more than"},
       {"name = \"mine\"\n", "Begin the file with unrig_law = 1."},
       {"unrig_law = [\n", "wanted TOML"},
@@ -172,6 +180,24 @@ TEST(LawFile, KeepsUnitsBoundsAndScales) {
   EXPECT_NEAR(slope[1], -0.1 * 1.5 * std::pow(2, 0.5) / 0.1, 1e-13);
   const std::pair<const char*, const char*> kinds[] = {{"-c * x^3", "stiffness"}, {"-c * v", "damping"}, {"-c * tanh(v)", "friction"}, {"-c * a", "inertia"}, {"c * t", "signal"}, {"c * alpha", "lift"}};
   for (const auto& [force, kind] : kinds) EXPECT_EQ(parse_law(file_of(force, "c = { start = 1 }\n"), "").kind(), kind) << force;
+}
+
+TEST(LawFile, KeepsWhereItWasLearnt) {
+  const Law law = parse_law(file_of("-c * abs(v) * v * x + theta * c", "c = { start = \"1 N\" }\n") + "[scales]\nv = \"10 cm/s\"\n[learnt_on]\nx = [\"-4 mm\", \"5 mm\"]\ntheta = [\"10 deg\", \"10 deg\"]\n", "law.toml");
+  ASSERT_EQ(law.learnt_on.size(), 2u) << "of v nothing is known";
+  EXPECT_NEAR(law.learnt_on.at(Symbol::x).lower, -0.004, 1e-17);
+  EXPECT_NEAR(law.learnt_on.at(Symbol::x).upper, 0.005, 1e-17);
+  EXPECT_NEAR(law.learnt_on.at(Symbol::theta).upper, 0.17453292519943295, 1e-15);
+  const Law again = parse_law(law_text(law), "again.toml");
+  EXPECT_TRUE(again.says_the_same_as(law));
+  ASSERT_EQ(again.learnt_on.size(), 2u);
+  for (const auto& [symbol, range] : law.learnt_on) {
+    EXPECT_EQ(again.learnt_on.at(symbol).lower, range.lower) << "to the last digit";
+    EXPECT_EQ(again.learnt_on.at(symbol).upper, range.upper);
+  }
+  const Law nothing = parse_law(file_of("-c * x", "c = { start = \"1 N\" }\n"), "law.toml");
+  EXPECT_TRUE(nothing.learnt_on.empty());
+  EXPECT_EQ(law_text(nothing).find("learnt_on"), std::string::npos);
 }
 
 const std::string hysteresis = R"toml(unrig_law = 1
