@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "core/propagate/exact_step.h"
+#include "core/law/learnt_range.h"
 #include "core/rig/gauge_lever.h"
 #include "core/model/ideal_step.h"
 #include "core/run/motion.h"
@@ -178,6 +179,16 @@ MatrixXd response_of(const SimulateProblem& problem, const LinearSystem& system,
   return output;
 }
 
+/// What gauge and sensors read, but for the steady state; which laws go beyond where they were learnt.
+MatrixXd read_response(const SimulateProblem& problem, const LinearSystem& system, const Conditions& conditions, std::vector<std::string>& beyond) {
+  LinearSystem with_sights = system;
+  std::vector<Sight> sights = append_sights(with_sights, problem.model, conditions, Sights::learnt);
+  const MatrixXd response = response_of(problem, with_sights, conditions);
+  take_values(sights, response.rightCols(static_cast<Index>(sights.size())), problem.run.dt);
+  beyond = beyond_learnt(sights, problem.run);
+  return response.leftCols(system.C.rows());
+}
+
 /// Outputs in the steady state of the first angle.
 VectorXd steady_reading(const SimulateProblem& problem, const LinearSystem& system, double angle) {
   VectorXd reading = angle * system.C.value.col(system.motion);
@@ -224,7 +235,7 @@ SimulateResult simulate(const SimulateProblem& problem) {
   for (DualMatrix* m : {&system.A, &system.B, &system.C, &system.D}) m->partial.clear();  // nobody asks for derivatives
 
   result.run = run;
-  MatrixXd reading = response_of(problem, system, conditions);
+  MatrixXd reading = read_response(problem, system, conditions, result.beyond);
   if (system.motion >= 0) {
     const VectorXd& angle = run.channel("alpha").value;
     if (problem.pitch == PitchBetweenSamples::spline) warn_of_noise(angle, result.warnings);

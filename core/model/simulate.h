@@ -31,6 +31,7 @@ struct SimulateResult {
   Run run;                             ///< the run with its simulated columns, those of the same name replaced
   std::vector<std::string> simulated;  ///< names of these columns
   std::vector<std::string> warnings;
+  std::vector<std::string> beyond;     ///< laws at work that this run takes beyond where they were learnt, in words (core/law/learnt_range.h)
 };
 
 /// Runs the coupled model, without noise and offsets.
@@ -42,6 +43,8 @@ struct SimulateResult {
 ///
 /// Nonlinear effects are followed together with motion, inputs and start in one pass (core/propagate/nonlinear_response.h). A pluck is released from the static
 /// deflection of the linear model: with a cubic spring or a gap at work the true one differs.
+///
+/// A law that goes beyond the range that it was learnt on is followed all the same, and said in `beyond`: whoever asks decides.
 ///
 /// At a jump the reading itself has delta functions, which no sample can show; the sample at the jump holds the limit from the right.
 ///
