@@ -17,6 +17,7 @@
 #include "fit/fit_description.h"
 #include "fit/solver/gauss_newton.h"
 #include "fit/givens/inexact_rig.h"
+#include "fit/likelihood/law_reach.h"
 #include "fit/search/no_worse_than_start.h"
 #include "fit/uncertainty/out_of_proportion.h"
 #include "fit/likelihood/run_order.h"
@@ -167,6 +168,7 @@ FitResult describe_fit(Arrival& arrival, const FitProblem& problem, Settle first
     result.variables += run.is_aside() ? 0 : run.linear_unknowns();
     result.runs.push_back(describe_run(run, joint.theta(r), run.is_aside() ? run.evaluate(joint.theta(r), Partials::none).chi2 : lin.run_chi2[r]));
   }
+  result.learnt_on = reach_of_laws(joint);
   result.noise_colour = noise_colours(joint);
   describe_parameters(joint, uncertainty, problem.start, result);
   if (inexact) inexact->describe(joint, with_numbers, result);

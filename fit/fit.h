@@ -1,9 +1,11 @@
 #pragma once
 #include <Eigen/Core>
 #include <functional>
+#include <map>
 #include <string>
 #include <vector>
 
+#include "core/law/law.h"
 #include "core/model/aeroelastic_model.h"
 #include "core/rig/rig.h"
 #include "core/run/run.h"
@@ -102,6 +104,7 @@ struct FitResult {
   std::vector<ChannelColour> noise_colour;  ///< of the fitted readings, where they have one (fit/likelihood/noise_colour.h)
   bool coloured = false;        ///< which of the two standard errors `std_error` is
   std::vector<std::string> effects;
+  std::map<std::string, LearntOn> learnt_on;  ///< how far the runs took what each law at work looks at, by its id
   Eigen::Index law_steps = 1;   ///< nonlinear laws were followed in so many times the steps that they ask for
   std::string rig_file;
   std::string rig_fingerprint;  ///< of the rig's numbers (core/rig/fingerprint.h)

@@ -14,6 +14,7 @@
 #include "core/rig/given_files.h"
 #include "core/law/law_effect.h"
 #include "core/files/text_file.h"
+#include "core/files/units.h"
 #include "fit/fit_json.h"
 
 namespace unrig {
@@ -139,7 +140,25 @@ void read_givens(const json& in, FittedRig& fit) {
     for (Eigen::Index j = 0; j < n; ++j) fit.joint_covariance(i, j) = rows.at(static_cast<std::size_t>(i)).at(static_cast<std::size_t>(j)).get<double>();
 }
 
-/// The laws at work, each with its whole file.
+/// A law of a fit. What the fit learnt stands in place of what the law's file says of it: its parameters are of these runs.
+Law read_fitted_law(const json& item, const std::string& path) {
+  const InputError::Place place{path + ", law " + item.value("name", ""), 0};
+  Law law = parse_law(item.at("text").get<std::string>(), place.file);
+  if (!item.contains("learnt_on")) return law;
+  law.learnt_on.clear();
+  for (const auto& [name, range] : item["learnt_on"].items()) {
+    const auto symbol = std::find(symbol_names.begin(), symbol_names.end(), name);
+    if (symbol == symbol_names.end()) throw std::invalid_argument(fmt::format("a law learnt on \"{}\", which is no symbol", name));
+    const auto s = static_cast<std::size_t>(symbol - symbol_names.begin());
+    const UnitScale scale = unit_scale(range.at(2).get<std::string>(), symbol_units[s], place, "learnt_on." + name);
+    const Range in_si{scale(range.at(0).get<double>()), scale(range.at(1).get<double>())};
+    if (!(in_si.lower <= in_si.upper)) throw std::invalid_argument(fmt::format("a law learnt on {} from {:g} to {:g}", name, in_si.lower, in_si.upper));
+    law.learnt_on.emplace(static_cast<Symbol>(s), in_si);
+  }
+  return law;
+}
+
+/// The laws at work, each with its whole file, and how far these runs took it.
 json laws_at_work(const FitResult& r, const std::vector<std::shared_ptr<const Effect>>& laws) {
   json list = json::array();
   for (const std::string& id : r.effects) {
@@ -149,6 +168,7 @@ json laws_at_work(const FitResult& r, const std::vector<std::shared_ptr<const Ef
     const Law& law = law_of(**found);
     json item = {{"effect", id}, {"name", law.name}, {"class", law.kind()}, {"acts_on", to_string(law.acts_on)}, {"force", law.force_text}};
     if (law.memory) item["memory"] = law.memory_text;
+    if (const auto learnt_on = r.learnt_on.find(id); learnt_on != r.learnt_on.end()) item["learnt_on"] = learnt_json<json>(learnt_on->second);
     item["file"] = law.file;
     item["text"] = law.text;
     list.push_back(item);
@@ -258,7 +278,7 @@ FittedRig read_fit(const json& in, const std::string& path) {
     }
     fit.effects = in.value("effects", std::vector<std::string>{});
     Rig laws;
-    for (const json& item : in.value("laws", json::array())) add_law(laws, parse_law(item.at("text").get<std::string>(), path + ", law " + item.value("name", "")));
+    for (const json& item : in.value("laws", json::array())) add_law(laws, read_fitted_law(item, path));
     fit.laws = laws.laws;
     for (const std::string& id : fit.effects) {
       if (is_law_id(id) && std::none_of(fit.laws.begin(), fit.laws.end(), [&](const auto& law) { return law->id == id; })) throw refuse(fmt::format("the law \"{}\" at work, but not among the \"laws\"", id));

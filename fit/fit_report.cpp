@@ -8,6 +8,7 @@
 #include <fmt/format.h>
 
 #include "core/files/text_file.h"
+#include "core/law/learnt_range.h"
 
 namespace unrig {
 namespace {
@@ -25,6 +26,14 @@ std::string report_givens(const FitResult& r) {
     text += fmt::format("    {:<{}} {: .6g} +/- {:.3g}{} (stated {:.6g} +/- {:.3g}) shift {:+.2f}, after {:.2f}\n", label(g) + ":", width + 1, g.value, g.std_error, g.unit == "1" ? "" : " " + g.unit, g.stated, g.stated_std,
                         (g.value - g.stated) / g.stated_std, g.std_error / g.stated_std);
   return text;
+}
+
+/// How far the runs took what the laws at work look at.
+std::string report_reach(const FitResult& r) {
+  std::string text;
+  for (const auto& [id, learnt_on] : r.learnt_on)
+    for (const auto& [symbol, range] : learnt_on) text += fmt::format("    {:<18} = where {}\n", id, told(symbol, range));
+  return text.empty() ? text : "[[Laws]] (learnt on; beyond, simulate and correct refuse them)\n" + text;
 }
 
 std::string left_out(const FittedChannel& c) {
@@ -72,6 +81,7 @@ std::string report(const FitResult& r, double least) {
   for (const ProfiledParameter& p : r.profiles)
     for (const ProfileInterval& i : p.intervals) text += fmt::format("    {:<{}} {}\n", &i == &p.intervals.front() ? label(p) + ":" : "", width + 1, i.text);
 
+  text += report_reach(r);
   text += report_givens(r);
   std::vector<std::tuple<double, std::string>> pairs;
   for (Eigen::Index i = 0; i < r.correlation.rows(); ++i)

@@ -9,6 +9,7 @@
 #include <nlohmann/json.hpp>
 
 #include "core/files/error.h"
+#include "core/law/law_effect.h"
 #include "tests/support/sample_data.h"
 #include "tests/support/temporary_directory.h"
 
@@ -30,6 +31,32 @@ json written(Eigen::Index law_steps) {
 FittedRig read_back(const json& fit) {
   const test::TemporaryDirectory directory;
   return read_fit(directory.file("fit.json", fit.dump()));
+}
+
+/// A fit with a law whose file says that it was learnt up to 2 m/s; these runs went from -0.3 to 0.28 m/s.
+json written_with_law(bool learnt) {
+  Rig rig;
+  add_law(rig, parse_law("unrig_law = 1\nname = \"drag\"\nacts_on = \"normal\"\nforce = \"-c * abs(v) * v\"\n[parameters]\nc = { start = \"5 N.s^2/m^2\" }\n[learnt_on]\nv = [\"-2 m/s\", \"2 m/s\"]\n", "law.toml"));
+  FitResult result;
+  result.effects = {"law:drag"};
+  if (learnt) result.learnt_on["law:drag"][Symbol::v] = {-0.3, 0.28};
+  result.parameters = {{"law:drag.c", "N.s^2/m^2", "", 40, 1, 1, 1, 0, true, ""}};
+  result.correlation = Eigen::MatrixXd::Identity(1, 1);
+  return json::parse(to_json(result, rig.laws));
+}
+
+TEST(FitFiles, SayWhereTheRunsOfTheFitTookALaw) {
+  const json fit = written_with_law(true);
+  EXPECT_EQ(fit["laws"][0]["learnt_on"], (json{{"v", {-0.3, 0.28, "m/s"}}}));
+  const Range here = law_of(*read_back(fit).laws.at(0)).learnt_on.at(Symbol::v), in_file = law_of(*read_back(written_with_law(false)).laws.at(0)).learnt_on.at(Symbol::v);
+  EXPECT_EQ(here.lower, -0.3) << "in place of what the law's file says";
+  EXPECT_EQ(here.upper, 0.28);
+  EXPECT_EQ(in_file.upper, 2) << "a fit of an earlier version";
+  for (const auto& [name, range] : {std::pair{"v", json{0.3, -0.3, "m/s"}}, {"w", json{0, 1, "m/s"}}, {"v", json{0, 1, "m"}}, {"v", json{0, 1}}}) {
+    json wrong = fit;
+    wrong["laws"][0]["learnt_on"] = {{name, range}};
+    EXPECT_THROW(read_back(wrong), InputError) << wrong["laws"][0]["learnt_on"];
+  }
 }
 
 TEST(FitFiles, CarryTheStepsInWhichLawsWereFollowed) {

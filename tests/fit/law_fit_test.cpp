@@ -118,6 +118,25 @@ TEST(LawFit, FindsPowerAndSizeOfADamping) {
   EXPECT_EQ(power.start, 1.5);
 }
 
+/// What a fit learns is how far its runs go, whatever the law's file says: velocity and displacement of the record as it was integrated, without noise.
+TEST(LawFit, LearnsHowFarItsRunsGo) {
+  constexpr double first = 0.01, noise = 2e-5;
+  const Truth truth{[](const State& s) { return -8 * std::abs(s[1]) * s[1] - 2e5 * s[0] * s[0] * s[0]; }};
+  FitProblem problem = problem_of(truth, first, VectorXd::Zero(1500), noise);
+  const VectorXd x = recorded(truth, first, VectorXd::Zero(1500), 0, 1);
+  const VectorXd v = (x.tail(1498) - x.head(1498)) / (2 * dt);
+  add(problem, "unrig_law = 1\nname = \"both\"\nacts_on = \"normal\"\nforce = \"-c * abs(v) * v - k * x^3\"\n[parameters]\nc = { start = \"5 N.s^2/m^2\" }\nk = { start = \"1e5 N/m^3\" }\n[learnt_on]\nx = [\"-9 m\", \"9 m\"]\n");
+  const FitResult result = fit(problem);
+  ASSERT_TRUE(result.converged) << result.message;
+  const LearntOn& learnt_on = result.learnt_on.at("law:both");
+  ASSERT_EQ(learnt_on.size(), 2u);
+  constexpr double near = 0.01;
+  EXPECT_NEAR(learnt_on.at(Symbol::x).lower / x.minCoeff(), 1, near);
+  EXPECT_NEAR(learnt_on.at(Symbol::x).upper / first, 1, near);
+  EXPECT_NEAR(learnt_on.at(Symbol::v).lower / v.minCoeff(), 1, near);
+  EXPECT_NEAR(learnt_on.at(Symbol::v).upper / v.maxCoeff(), 1, near);
+}
+
 TEST(LawFit, OfHysteresisIsThatOfTheCompiledEffect) {
   constexpr double noise = 2e-5;
   const Truth truth{[](const State& s) { return -12 * s[2]; }, [](const State& s) {
