@@ -295,7 +295,6 @@ bool weigh(const DiagnoseProblem& problem, const Setting& files, const Trial& ba
 struct Laws {
   std::vector<Trial> tried;  ///< the best first, which is what was found
   std::vector<Rival> rivals;
-  Reach reach;
 };
 
 bool leaves_something(const Trial& t) { return what_remains(t).found; }
@@ -325,7 +324,6 @@ std::optional<Laws> look_for_laws(const DiagnoseProblem& problem, FitProblem& fi
       selection.add({t.effects, t.reduced_chi2(), bic_difference(t, baseline), 0, 0});
       laws.tried.push_back(std::move(t));
     }
-    laws.reach = search.reach();
   };
   look_beside(baseline);
   if (!found.best.effects.empty()) look_beside(found.best);
@@ -358,7 +356,7 @@ std::optional<Laws> look_for_laws(const DiagnoseProblem& problem, FitProblem& fi
 void tell_laws(FitProblem& fit_problem, const Laws& laws, const FoundSet& found, std::vector<MissingEffect>& set, Diagnosis& d) {
   for (MissingEffect& m : set)
     if (is_law_id(m.effect)) {
-      m.law = found_law(fit_problem.rig, m.effect, found.fit, laws.reach);
+      m.law = found_law(fit_problem.rig, m.effect, found.fit);
       if (m.effect == found.best.effects.back()) m.law->rivals = laws.rivals;
     }
   std::erase_if(fit_problem.rig.laws, [&](const auto& law) { return std::find(found.best.effects.begin(), found.best.effects.end(), law->id) == found.best.effects.end(); });

@@ -8,7 +8,9 @@
 #include <nlohmann/json.hpp>
 
 #include "core/files/text_file.h"
+#include "core/law/learnt_range.h"
 #include "fit/fit_files.h"
+#include "fit/fit_json.h"
 #include "fit/uncertainty/out_of_proportion.h"
 
 namespace unrig {
@@ -131,8 +133,7 @@ ordered_json law_json(const FoundLaw& found) {
   ordered_json law = {{"name", found.law.name}, {"acts_on", to_string(found.law.acts_on)}, {"class", found.law.name.starts_with("curve") ? "curve" : found.law.kind()}, {"force", found.law.force_text}};
   if (!found.law.memory_text.empty()) law["memory"] = found.law.memory_text;
   law["text"] = found.law.text;
-  law["learnt_on"] = ordered_json::object();
-  for (const auto& [symbol, range] : found.learnt_on) law["learnt_on"][symbol] = {range.lowest, range.highest, range.unit};
+  law["learnt_on"] = learnt_json<ordered_json>(found.law.learnt_on);
   law["rivals"] = ordered_json::array();
   for (const Rival& r : found.rivals) {
     ordered_json rival = {{"effects", r.effects}, {"force", r.force}};
@@ -165,7 +166,7 @@ ordered_json effects_json(const std::vector<MissingEffect>& effects) {
 
 std::string law_words(const FoundLaw& found) {
   std::string text;
-  for (const auto& [symbol, range] : found.learnt_on) text += fmt::format("    learnt where {} is from {:.3g} to {:.3g} {}; beyond, it is a guess\n", symbol, range.lowest, range.highest, range.unit);
+  for (const auto& [symbol, range] : found.law.learnt_on) text += fmt::format("    learnt where {}; beyond, it is a guess, which simulate and correct refuse\n", told(symbol, range));
   for (const Rival& r : found.rivals) text += fmt::format("    these runs cannot refute {}: {:.1f} standard deviations away, odds 1 to {:.3g}\n", r.force + (r.memory.empty() ? "" : ", z' = " + r.memory), r.distance, std::exp(r.log_odds));
   if (found.rivals.empty()) text += "    of the forms that were tried these runs refute every other\n";
   return text;

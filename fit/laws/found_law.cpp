@@ -5,47 +5,29 @@
 
 #include "core/effects/effect.h"
 #include "core/law/law_effect.h"
+#include "fit/likelihood/law_reach.h"
 
 namespace unrig {
 namespace {
 
-/// How far the runs took a symbol.
-FoundLaw::Learnt learnt(Symbol symbol, const Reach& r) {
-  switch (symbol) {
-    case Symbol::x: return {-r.x, r.x, "m"};
-    case Symbol::v: return {-r.v, r.v, "m/s"};
-    case Symbol::a: return {-r.a, r.a, "m/s^2"};
-    case Symbol::twist: return {-r.twist, r.twist, "rad"};
-    case Symbol::twist_rate: return {-r.twist_rate, r.twist_rate, "rad/s"};
-    case Symbol::alpha: return {-r.alpha, r.alpha, "rad"};
-    case Symbol::t: return {0, r.seconds, "s"};
-    default: return {0, 0, ""};
-  }
-}
-
-/// The law with its parameters at these values, as far as there are any.
-Law at_values(Law law, const std::function<const double*(const std::string&)>& value_of) {
+/// The law with its parameters at these values, as far as there are any, and learnt where these runs went.
+Law at_values(Law law, const std::function<const double*(const std::string&)>& value_of, const std::map<std::string, LearntOn>& reach) {
   for (Parameter& p : law.parameters)
     if (const double* value = value_of(law.id() + "." + p.name); value && std::isfinite(*value)) p.start = std::clamp(*value, p.lower, p.upper);
+  if (const auto learnt_on = reach.find(law.id()); learnt_on != reach.end()) law.learnt_on = learnt_on->second;
   law.text = law_text(law);
   return law;
 }
 
 }  // namespace
 
-FoundLaw found_law(const Rig& rig, const std::string& id, const FitResult& fit, const Reach& reach) {
+FoundLaw found_law(const Rig& rig, const std::string& id, const FitResult& fit) {
   const auto value_of = [&](const std::string& name) -> const double* {
     for (const FittedParameter& p : fit.parameters)
       if (p.name == name) return &p.value;
     return nullptr;
   };
-  FoundLaw found{at_values(law_of(effect(rig, id)), value_of), {}, {}};
-  for (std::size_t s = 0; s < symbol_count; ++s) {
-    const auto symbol = static_cast<Symbol>(s);
-    if (!found.law.uses(symbol)) continue;
-    if (FoundLaw::Learnt range = learnt(symbol, reach); !range.unit.empty()) found.learnt_on.emplace(symbol_names[s], std::move(range));
-  }
-  return found;
+  return {at_values(law_of(effect(rig, id)), value_of, fit.learnt_on), {}};
 }
 
 std::vector<Rival> rivals(const std::vector<Trial>& tried, const std::function<bool(const Trial&)>& leaves_something, double decisive) {
@@ -62,7 +44,7 @@ std::vector<Rival> rivals(const std::vector<Trial>& tried, const std::function<b
           if (t.arrival.joint.parameter(u).name == name) return &u.value;
         return nullptr;
       };
-      const Law law = at_values(law_of(e), value_of);
+      const Law law = at_values(law_of(e), value_of, reach_of_laws(t.arrival.joint));
       rival.force = law.force_text;
       rival.memory = law.memory_text;
       rival.text = law.text;

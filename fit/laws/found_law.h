@@ -1,5 +1,5 @@
 #pragma once
-#include <map>
+#include <functional>
 #include <string>
 #include <vector>
 
@@ -20,17 +20,12 @@ struct Rival {
 
 /// A law with what goes with it.
 struct FoundLaw {
-  Law law;  ///< parameters start where the fit found them
-  struct Learnt {
-    double lowest, highest;
-    std::string unit;
-  };
-  std::map<std::string, Learnt> learnt_on;  ///< range of each symbol that it looks at
+  Law law;  ///< parameters start where the fit found them; learnt on how far the fitted runs went
   std::vector<Rival> rivals;
 };
 
 /// The law `id` of `rig`, at the values of a fit.
-FoundLaw found_law(const Rig& rig, const std::string& id, const FitResult& fit, const Reach& reach);
+FoundLaw found_law(const Rig& rig, const std::string& id, const FitResult& fit);
 
 /// Of all sets that were tried those that leave nothing and whose evidence is within `decisive` (a difference of BIC) of the best, which stands first and is none of them.
 std::vector<Rival> rivals(const std::vector<Trial>& tried, const std::function<bool(const Trial&)>& leaves_something, double decisive);

@@ -44,8 +44,7 @@ std::vector<Trial> LawSearch::one_more(const Trial& base) {
   const bool by_decays = has_decays(base.arrival.joint) && left_of_decays(base) > explained;
   if (problem_.progress) problem_.progress("looking for the law of what is missing" + (base.effects.empty() ? std::string() : " beside " + base.effects.back()));
   const BesideUnknownForces beside = beside_unknown_forces(base.arrival.joint);
-  reach_ = reach_of(beside);
-  const std::vector<Form> forms = dictionary(problem_.rig, reach_);
+  const std::vector<Form> forms = dictionary(problem_.rig, reach_of(beside));
   std::vector<Screened> screened(forms.size());
   if (by_decays) screened = screen(forms, beside);
   std::vector<std::size_t> order;

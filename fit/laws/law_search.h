@@ -24,8 +24,6 @@ class LawSearch {
 
   /// All sets that were fitted in full, `base` with one law more or two, the best first; empty where no form explains anything.
   std::vector<Trial> search();
-  /// How far the free decays took the states, beside unknown accelerations.
-  const Reach& reach() const { return reach_; }
 
  private:
   std::vector<Trial> one_more(const Trial& base);
@@ -33,7 +31,6 @@ class LawSearch {
   FitProblem& problem_;
   const Trial& base_;
   std::function<bool(const Trial&)> leaves_something_;
-  Reach reach_;
 };
 
 }  // namespace unrig
