@@ -6,6 +6,7 @@
 
 #include "core/files/command.h"
 #include "core/files/error.h"
+#include "core/law/law_effect.h"
 #include "correct/report/fit_traces.h"
 #include "correct/report/result_files.h"
 #include "correct/report/rig_sections.h"
@@ -53,6 +54,20 @@ void add_parameters(ReportPage& page, const json& parameters) {
                     plain(number_of(p, "start")), remark});
   }
   page.add_table("Parameters", {"parameter", "of run", "value ± one standard error", "unit", "started from", "remark"}, rows);
+}
+
+/// Laws of one's own at work, and how far the fitted runs took what they look at.
+void add_laws(ReportPage& page, const FittedRig& fit) {
+  std::vector<std::vector<std::string>> rows;
+  for (const auto& effect : fit.laws) {
+    const Law& law = law_of(*effect);
+    page.add_equation(law.name, effect->equation, law.file);
+    for (const auto& [symbol, range] : law.learnt_on) {
+      const auto s = static_cast<std::size_t>(symbol);
+      rows.push_back({law.name, std::string(symbol_names[s]), plain(range.lower), plain(range.upper), symbol_units[s]});
+    }
+  }
+  if (!rows.empty()) page.add_table("Laws learnt on", {"law", "symbol", "from", "to", "unit"}, rows, "Outside of these ranges a law is a guess: simulate and correct refuse it.");
 }
 
 void add_runs(ReportPage& page, const json& runs) {
@@ -138,6 +153,7 @@ void add_fit(ReportPage& page, const json& result, const std::string& path, cons
   add_parameters(page, result["parameters"]);
   page.add_text("Standard errors: " + text_of(result, "standard_errors") + ".");
   if (!fit.effects.empty()) page.add_text(fmt::format("Physics beyond the rig at work: {}.", fmt::join(fit.effects, ", ")));
+  add_laws(page, fit);
   add_warnings(page, result);
   const json runs = result.value("runs", json::array());
   add_runs(page, runs);

@@ -16,6 +16,7 @@
 #include "core/rig/given_files.h"
 #include "core/model/indicial_table.h"
 #include "core/law/law_effect.h"
+#include "core/law/learnt_range.h"
 #include "core/files/provenance.h"
 #include "core/run/run_text.h"
 #include "core/files/scan.h"
@@ -162,6 +163,12 @@ ToSimulate simulate_problem(Rig rig, Run run, const std::optional<FittedRig>& fi
   return {std::move(problem), made_by};
 }
 
+SimulateResult simulate_within(const SimulateProblem& problem, const SimulateOptions& options) {
+  SimulateResult result = simulate(problem);
+  refuse_beyond(result.beyond, problem.run.file, options.beyond, result.warnings);
+  return result;
+}
+
 namespace {
 
 ToSimulate problem_of(const Options& options, const Provenance& made) {
@@ -190,7 +197,7 @@ void print_comparison(const Run& recorded, const SimulateResult& result) {
 }
 
 /// What was assumed, for the head of the file: whoever reads it later can run it again.
-std::vector<std::string> recipe(const SimulateProblem& problem) {
+std::vector<std::string> recipe(const SimulateProblem& problem, const SimulateResult& result) {
   const AeroelasticModel& model = problem.model;
   std::vector<std::string> lines{fmt::format("simulated with the rig \"{}\"", model.rig().name)};
   if (!model.rig().is_modal())
@@ -201,6 +208,7 @@ std::vector<std::string> recipe(const SimulateProblem& problem) {
         fmt::format("{} = {:.10g} {}", model.parameters()[j].name, problem.theta[static_cast<Index>(j)], model.parameters()[j].unit));
   for (const std::string& id : model.effect_ids())
     if (is_law_id(id)) lines.push_back(fmt::format("{}: {}", id, effect(model.rig(), id).equation));
+  for (const std::string& beyond : result.beyond) lines.push_back("a guess: " + beyond);
   if (problem.steady_normal_force) lines.push_back(fmt::format("{} = {:.10g} 1", steady_name, *problem.steady_normal_force));
   if (problem.release_load) lines.push_back(fmt::format("released from {:.10g} N", *problem.release_load));
   if (problem.pitch == PitchBetweenSamples::jumps) lines.emplace_back("the angle jumps between samples");
@@ -240,6 +248,7 @@ int simulate_command(int argc, char** argv) {
   app.add_option("--release-load", options.release_load, "load at the calibration element that a pluck is released from, such as \"20 N\"");
   app.add_flag("--jumps", options.jumps, "the angle jumps from sample to sample: ideal steps, in place of a spline");
   app.add_flag("--as-recorded", options.as_recorded, "every reading of the angle as it is, its noise too; otherwise a measured angle is simulated as the smooth motion that it says");
+  app.add_flag("--beyond", options.beyond, beyond_help);
   app.footer("Example:\n  unrig simulate --rig rig.toml --run step.csv --set normal.damping_ratio=0 -o simulated.csv");
   try {
     parse_command_line(app, argc, argv);
@@ -254,10 +263,10 @@ int simulate_command(int argc, char** argv) {
   const SimulateProblem& problem = given.problem;
   Progress progress;
   progress("simulating " + options.run);
-  const SimulateResult result = simulate(problem);
+  const SimulateResult result = simulate_within(problem, options);
   for (const std::string& warning : result.warnings) warn(warning);
   progress("writing " + options.output);
-  write_text(options.output, [&](const TextSink& sink) { run_text(sink, result.run, SimulatedRun{problem.run.file, recipe(problem), given.made_by}.remarks()); });
+  write_text(options.output, [&](const TextSink& sink) { run_text(sink, result.run, SimulatedRun{problem.run.file, recipe(problem, result), given.made_by}.remarks()); });
   progress.clear();
   print_summary(problem, result, options.output);
   print_comparison(problem.run, result);

@@ -21,7 +21,10 @@ using test::Finished;
 using test::run_unrig;
 using test::TemporaryDirectory;
 using ::testing::AllOf;
+using ::testing::Gt;
 using ::testing::HasSubstr;
+using ::testing::Lt;
+using ::testing::Not;
 
 const std::string law = "unrig_law = 1\nname = \"drag\"\nacts_on = \"normal\"\nforce = \"-c * abs(v) * v\"\n[parameters]\nc = { start = \"5 N.s^2/m^2\", lower = \"0 N.s^2/m^2\" }\n";
 
@@ -74,7 +77,7 @@ TEST(Laws, GoFromTheirFileThroughTheFitToTheSimulation) {
 
   const Finished reported = run_unrig(directory, {"report", fit, "-o", directory.path("report.html")});
   EXPECT_EQ(reported.status, 0) << reported.err;
-  EXPECT_THAT(read_text(directory.path("report.html")), HasSubstr("law:drag"));
+  EXPECT_THAT(read_text(directory.path("report.html")), AllOf(HasSubstr("law:drag"), HasSubstr("Laws learnt on")));
 
   std::string changed = law;
   changed.replace(changed.find("abs(v) * v"), 10, "v^3");
@@ -85,6 +88,41 @@ TEST(Laws, GoFromTheirFileThroughTheFitToTheSimulation) {
   const Finished more = with({"--law", directory.file("other.toml", changed)});
   EXPECT_EQ(more.status, 0) << more.err;
   EXPECT_THAT(more.err, HasSubstr("the law \"more\" had no part in"));
+}
+
+/// The record goes to 0.6 m/s; a release from ten times its load goes further, and so does any run where the law's file says that little was learnt.
+TEST(Laws, AreRefusedBeyondWhereTheyWereLearnt) {
+  const TemporaryDirectory directory;
+  const std::string rig = directory.file("rig.toml", "unrig_rig = 1\nname = \"spring\"\n[[modal]]\nmass = \"2 kg\"\nfrequency = \"5 Hz\"\ndamping_ratio = 0.002\ngauge_gain = \"1000 N/m\"\n");
+  const std::string run = decay(directory), fit = directory.path("fit.json"), out = directory.path("out.csv");
+  ASSERT_EQ(run_unrig(directory, {"fit", "--rig", rig, "--law", directory.file("law.toml", law), run, "-o", fit}).status, 0);
+  const json learnt = json::parse(read_text(fit))["laws"][0]["learnt_on"]["v"];
+  EXPECT_THAT(learnt[1].get<double>(), AllOf(Gt(0.3), Lt(0.628))) << "0.02 m times 31.4 rad/s, less what drag takes";
+  const auto simulate = [&](const std::string& load, std::vector<std::string> more) {
+    std::vector<std::string> words{"simulate", "--rig", rig, "--run", run, "--release-load", load, "-o", out};
+    words.insert(words.end(), more.begin(), more.end());
+    return run_unrig(directory, words);
+  };
+  const Finished within = simulate("39 N", {"--fit", fit});
+  EXPECT_EQ(within.status, 0) << within.err;
+  EXPECT_THAT(within.err, Not(HasSubstr("learnt")));
+  std::filesystem::remove(out);
+
+  const Finished beyond = simulate("390 N", {"--fit", fit});
+  EXPECT_EQ(beyond.status, 1);
+  EXPECT_THAT(beyond.err, AllOf(HasSubstr("run.csv: the law \"drag\" was learnt where v is from -0."), HasSubstr("here v is from -"), HasSubstr("beyond for the first time at 0.0"), HasSubstr("--beyond")));
+  EXPECT_FALSE(std::filesystem::exists(out));
+  const Finished all_the_same = simulate("390 N", {"--fit", fit, "--beyond"});
+  EXPECT_EQ(all_the_same.status, 0) << all_the_same.err;
+  EXPECT_THAT(all_the_same.err, HasSubstr("Beyond, a law is a guess"));
+  EXPECT_THAT(read_text(out), HasSubstr("a guess: the law \"drag\" was learnt where v"));
+
+  const std::string file = directory.file("timid.toml", law + "[learnt_on]\nv = [\"-1 cm/s\", \"1 cm/s\"]\n");
+  const Finished from_file = simulate("39 N", {"--law", file});
+  EXPECT_EQ(from_file.status, 1);
+  EXPECT_THAT(from_file.err, HasSubstr("was learnt where v is from -0.01 to 0.01 m/s"));
+  const Finished fitted = simulate("39 N", {"--law", file, "--fit", fit});
+  EXPECT_EQ(fitted.status, 0) << "the fit has learnt more since: " << fitted.err;
 }
 
 TEST(Laws, ThatCannotBeReadAreRefusedWithTheirPlace) {
