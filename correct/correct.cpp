@@ -22,6 +22,7 @@
 #include "correct/segments/beyond_noise.h"
 #include "correct/segments/inexact_load.h"
 #include "correct/segments/knots.h"
+#include "correct/segments/laws_in_legs.h"
 #include "correct/segments/load_in_legs.h"
 #include "correct/estimate/noise_choice.h"
 #include "correct/estimate/prior.h"
@@ -400,6 +401,7 @@ CorrectResult correct_at(const CorrectProblem& problem, const FittedNumbers* num
     correct_restless({model, run, prior, start, length, steady_per_reading(problem.rig), problem.imposed}, result);
     if (numbers) result.warnings.push_back(fmt::format("{}: the shaft hardly ever rests; the band of such a run does not allow for the uncertainties that rig file and run state.", run.file));
     if (!problem.fit.left.empty()) result.warnings.push_back(fit_leaves_unheeded(problem));
+    warn_of_laws_unheeded(model, run, result.warnings);
     look_at_what_is_left(run, 2 * run.samples(), 1, band_over_change(result), result);
     return result;
   }
@@ -409,6 +411,7 @@ CorrectResult correct_at(const CorrectProblem& problem, const FittedNumbers* num
   const Search free = estimate(legs, prior, start, problem.fit.noise_colour);
   const Search best = problem.imposed.any() ? constrained(legs, free, problem.imposed, model, response_semichords(length)) : free;
   const VectorXd& theta = best.solution.theta;
+  refuse_beyond_learnt(legs, theta, problem.beyond, result.warnings);
 
   legs.differentiate_only({});
   RunInLegs::Together together;

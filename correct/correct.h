@@ -17,6 +17,7 @@ struct CorrectProblem {
   Run run;
   double calibration_uncertainty = 0;  ///< of the gauge, relative, one standard deviation; 0: the rig's
   Imposed imposed = {};                ///< on the indicial response
+  bool beyond = false;                 ///< go on where a law of the fit is taken beyond the range that it was learnt on
 };
 
 /// A load over the record [N].
@@ -74,7 +75,8 @@ struct CorrectResult {
 /// Standard deviations by source: correct/estimate/uncertainty_budget.h. They are computed at up to some thousand samples, all of those in which the shaft moves as long as
 /// these are few, and interpolated between. The gauge's zero and the steady load cannot be told apart: the steady part of the load is the reading
 /// before the motion.
-/// Throws InputError where the run has no angle channel or no stream, NoAnswer where the angle does not move, or where it hardly ever rests and the fit names a nonlinear force.
+/// Throws InputError where the run has no angle channel or no stream, NoAnswer where the angle does not move, where it hardly ever rests and the fit names a nonlinear force, or where the estimated
+/// trajectory takes a law of the fit beyond the range that it was learnt on (core/law/learnt_range.h); under CorrectProblem::beyond that is a warning.
 CorrectResult correct(const CorrectProblem& problem);
 
 }  // namespace unrig

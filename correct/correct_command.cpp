@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include "core/check/gate.h"
+#include "core/law/learnt_range.h"
 #include "core/files/command.h"
 #include "core/files/command_line.h"
 #include "core/rig/fingerprint.h"
@@ -49,8 +50,9 @@ int correct_command(int argc, char** argv) {
   app.add_option("--indicial", indicial, "indicial response (CSV)");
   app.add_option("--calibration-error", calibration, "relative standard deviation of the gauge's calibration, in place of the rig file's")
       ->check(CLI::Range(0.0, 1.0));
-  bool anyway = false;
+  bool anyway = false, beyond = false;
   app.add_flag("--anyway", anyway, anyway_help);
+  app.add_flag("--beyond", beyond, beyond_help);
   Imposed imposed;
   app.add_flag("--monotone", imposed.monotone, "impose an indicial response that never falls (else only tested)");
   app.add_option("--at-step", imposed.at_step, "impose its value at the step, 0.5 for a thin airfoil (else only tested)")->check(CLI::Range(-1.0, 2.0));
@@ -63,7 +65,7 @@ int correct_command(int argc, char** argv) {
   check_outputs({{"-o", output}, {"--indicial", indicial}}, {rig_path, fit_path, run_path});
   Progress progress;
   progress("reading " + run_path);
-  const CorrectProblem problem{read_rig(rig_path), read_fit(fit_path), read_run(run_path), calibration, imposed};
+  const CorrectProblem problem{read_rig(rig_path), read_fit(fit_path), read_run(run_path), calibration, imposed, beyond};
   progress("taking the rig out of " + run_path);
   if (problem.fit.rig_fingerprint.empty()) warn(fit_path + ": it does not say what the rig was: an earlier version wrote it. Whether it belongs to " + rig_path + " was not compared.");
   const MadeBy made_by{provenance_of(argc, argv, {"--indicial"}), fingerprint(problem.rig), fingerprint(problem.run, problem.rig), fingerprint(problem.fit)};

@@ -242,9 +242,9 @@ py::dict load_of(const CorrectedLoad& load) {
   return py::dict("value"_a = load.value, "std"_a = load.std, "by_source"_a = load.by_source, "half_weight"_a = load.half_weight, "twice_weight"_a = load.twice_weight, "simultaneous"_a = load.simultaneous);
 }
 
-py::dict correction(const Rig& rig, const std::string& fit_json, const std::string& fit_name, const Run& run, double calibration, bool monotone, std::optional<double> at_step, bool anyway, const py::object& progress) {
+py::dict correction(const Rig& rig, const std::string& fit_json, const std::string& fit_name, const Run& run, double calibration, bool monotone, std::optional<double> at_step, bool anyway, bool beyond, const py::object& progress) {
   using namespace py::literals;
-  const CorrectProblem problem{rig, read_fit(nlohmann::json::parse(fit_json), fit_name), run, calibration, {monotone, at_step}};
+  const CorrectProblem problem{rig, read_fit(nlohmann::json::parse(fit_json), fit_name), run, calibration, {monotone, at_step}, beyond};
   if (rig.is_modal()) {
     std::optional<ModalLoad> result = in_a_thread(
         [problem, anyway](const Say&) {
@@ -320,7 +320,7 @@ PYBIND11_MODULE(_unrig, m) {
       .def_property_readonly("json", [](const FitWithLaws& r) { return to_json(r, r.laws); })
       .def("report", [](const FitWithLaws& r, double least) { return report(r, least); }, "least"_a = 0.1);
   m.def("fit", &fit_of, "rig"_a, "runs"_a, "effects"_a, "laws"_a, "start"_a, "profile"_a, "anyway"_a, "progress"_a);
-  m.def("correct", &correction, "rig"_a, "fit_json"_a, "fit_name"_a, "run"_a, "calibration"_a, "monotone"_a, "at_step"_a, "anyway"_a, "progress"_a);
+  m.def("correct", &correction, "rig"_a, "fit_json"_a, "fit_name"_a, "run"_a, "calibration"_a, "monotone"_a, "at_step"_a, "anyway"_a, "beyond"_a, "progress"_a);
 
   m.def("apparent_mass", [](const Rig& rig, const Run& dry, const Run& wet, const py::object& progress) {
     ApparentMassProblem problem;
@@ -374,17 +374,17 @@ PYBIND11_MODULE(_unrig, m) {
         },
         py::none());
   });
-  m.def("simulate", [](const Rig& rig, const Run& run, const std::string& fit_json, const std::string& fit_name, const std::vector<std::string>& settings, const std::string& release_load, bool jumps, bool as_recorded, const py::object& progress) {
+  m.def("simulate", [](const Rig& rig, const Run& run, const std::string& fit_json, const std::string& fit_name, const std::vector<std::string>& settings, const std::string& release_load, bool jumps, bool as_recorded, bool beyond, const py::object& progress) {
     SimulateOptions options;
     options.rig = rig.file, options.run = run.file, options.fit = fit_name;
-    options.settings = settings, options.release_load = release_load, options.jumps = jumps, options.as_recorded = as_recorded;
+    options.settings = settings, options.release_load = release_load, options.jumps = jumps, options.as_recorded = as_recorded, options.beyond = beyond;
     std::optional<FittedRig> fit;
     if (!fit_json.empty()) fit = read_fit(nlohmann::json::parse(fit_json), fit_name);
     return in_a_thread(
         [rig, run, fit, options](const Say&) {
           for (const std::vector<std::string>* known : {&rig.warnings, &run.warnings})
             for (const std::string& warning : *known) warn(warning);
-          const SimulateResult result = simulate(simulate_problem(rig, run, fit, options, {}).problem);
+          const SimulateResult result = simulate_within(simulate_problem(rig, run, fit, options, {}).problem, options);
           for (const std::string& warning : result.warnings) warn(warning);
           return result.run;
         },

@@ -36,30 +36,31 @@ def text_of_fit(result: Union[Path, FitResult]) -> tuple[str, str]:
 
 
 def simulate(rig: Union[Path, Rig], run: Union[Path, Run], *, result: Union[Path, FitResult, None] = None, settings: Mapping[str, float] = {}, release_load: Optional[float] = None, jumps: bool = False,
-             as_recorded: bool = False, progress: Progress = None) -> Run:
+             as_recorded: bool = False, beyond: bool = False, progress: Progress = None) -> Run:
     """What gauge and sensors read in a motion, as `unrig simulate`: a run with its columns in SI.
 
     result: a fit, or the path of its fit.json. settings: values of model parameters in SI, by name.
     release_load: load at the calibration element that a pluck is released from [N].
     jumps: the angle jumps between samples. as_recorded: the angle with its noise.
+    beyond: go on where a law is taken beyond the range that it was learnt on; without it that raises NoAnswer.
     """
     text, name = ("", "") if result is None else text_of_fit(result)
     load = "" if release_load is None else f"{float(release_load)!r} N"
-    return _unrig.simulate(as_rig(rig), as_run(run), text, name, [f"{key}={float(value)!r}" for key, value in settings.items()], load, jumps, as_recorded, progress)
+    return _unrig.simulate(as_rig(rig), as_run(run), text, name, [f"{key}={float(value)!r}" for key, value in settings.items()], load, jumps, as_recorded, beyond, progress)
 
 
 def correct(rig: Union[Path, Rig], result: Union[Path, FitResult], run: Union[Path, Run], *, calibration_error: float = 0.0, monotone: bool = False, at_step: Optional[float] = None, anyway: bool = False,
-            progress: Progress = None):
+            beyond: bool = False, progress: Progress = None):
     """The load of a rigid rig out of a gauge record, as `unrig correct`: an xarray.Dataset.
 
     result: a fit, or the path of its fit.json. calibration_error: relative standard deviation of the gauge's calibration.
-    monotone, at_step: impose a response that never falls, and its value at the step.
+    monotone, at_step: impose a response that never falls, and its value at the step. beyond: as of `simulate`.
     Variables over `time` [s]: gauge, normal_force, circulatory [N] with `_std`, cn; over `semichords`: indicial and indicial_std.
     """
     import xarray
     rig, run = as_rig(rig), as_run(run)
     text, name = text_of_fit(result)
-    r = _unrig.correct(rig, text, name, run, calibration_error, monotone, at_step, anyway, progress)
+    r = _unrig.correct(rig, text, name, run, calibration_error, monotone, at_step, anyway, beyond, progress)
     time = r["start"] + r["dt"] * np.arange(len(r["gauge"]))
     attrs = {"rig": rig.file, "run": run.file, "fit": name, "unrig_version": _unrig.__version__, "run_fingerprint": run.fingerprint, "no_answer": r["no_answer"], "warnings": "\n".join(r["warnings"]),
              "noise": r["noise"]}
