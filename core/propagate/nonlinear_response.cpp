@@ -333,6 +333,13 @@ class Follower {
 
 }  // namespace
 
+LinearSystem linear_part(LinearSystem system) {
+  const Index measured = system.B.cols() - static_cast<Index>(system.feedback.size());
+  system.feedback.clear();
+  for (DualMatrix* m : {&system.B, &system.D}) *m = m->block(0, 0, m->rows(), measured);
+  return system;
+}
+
 ExactStep step_to_follow(const LinearSystem& system, double dt) { return exact_step(system, dt / static_cast<double>(steps_per_sample(system))); }
 
 NonlinearResponse follow(const LinearSystem& system, const ExactStep& step, const VectorXd& theta, const NonlinearDrive& drive, Index samples, Partials partials) {

@@ -27,6 +27,9 @@ struct NonlinearResponse {
   bool finite = true;
 };
 
+/// The system without its laws and the inputs that these drive: what is left of B and D belongs to what was measured.
+LinearSystem linear_part(LinearSystem system);
+
 /// The step that `follow` takes: a sample, or as small a part of it as the most demanding of the system's feedbacks wants.
 ExactStep step_to_follow(const LinearSystem& system, double dt);
 

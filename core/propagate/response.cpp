@@ -3,6 +3,9 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <stdexcept>
+
+#include <fmt/format.h>
 
 namespace unrig {
 namespace {
@@ -122,6 +125,7 @@ Response coast(const LinearSystem& system, const ExactStep& step, const DualMatr
 
 Response drive(const LinearSystem& system, const ExactStep& step, const DualMatrix& start, Index samples, const VectorXd& jerk, const MatrixXd& input,
                Partials partials) {
+  if (input.rows() > 0 && input.cols() != system.B.cols()) throw std::invalid_argument(fmt::format("a system of {} inputs cannot be driven by {}", system.B.cols(), input.cols()));
   const Index n = system.states(), channels = system.C.rows();
   std::vector<Index> active;  // parameters carried along
   if (partials == Partials::all)

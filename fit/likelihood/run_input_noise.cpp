@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/propagate/nonlinear_response.h"
 #include "fit/likelihood/input_noise.h"
 #include "fit/likelihood/readings_noise.h"
 #include "fit/likelihood/run_linearised.h"
@@ -20,9 +21,8 @@ using Eigen::VectorXd;
 namespace {
 
 /// What a model does to its inputs, nonlinear forces left out.
-LinearSystem linear_part(const AeroelasticModel& model, const Conditions& conditions, const VectorXd& theta, const std::vector<std::string>& channels, Partials partials) {
-  LinearSystem linear = model.system(conditions, theta, channels);
-  linear.feedback.clear();
+LinearSystem linear_system(const AeroelasticModel& model, const Conditions& conditions, const VectorXd& theta, const std::vector<std::string>& channels, Partials partials) {
+  LinearSystem linear = linear_part(model.system(conditions, theta, channels));
   if (partials == Partials::none)
     for (DualMatrix* m : {&linear.A, &linear.B, &linear.C, &linear.D}) m->partial.clear();
   return linear;
@@ -56,7 +56,7 @@ void RunResidual::Linearised::settle_input_noise(RunResidual& run, const VectorX
   if (run.motion_.unknowns() > 0 || run.inputs_.cols() == 0) return;
   const std::optional<InputNoiseModel> inputs = noise_of_inputs(*run.run_, run.conditions_);
   if (!inputs) return;
-  const LinearSystem linear = linear_part(*run.model_, run.conditions_, theta, run.channels_, Partials::none);
+  const LinearSystem linear = linear_system(*run.model_, run.conditions_, theta, run.channels_, Partials::none);
   const ExactStep to_next = exact_step(linear, run.run_->dt);
   const MatrixXd column = MatrixXd((run.weight_.array() > 0).select(left, 0.0)).reshaped();
   MatrixXd weight = run.tempered_ * run.weight_;
@@ -85,7 +85,7 @@ std::shared_ptr<const InputNoise> RunResidual::Linearised::noise_through(const R
   const InputNoiseModel* inputs = input_noise(run);
   if (!inputs) return nullptr;
   if (run.last_solution_.model && run.last_solution_.theta == theta) return run.last_solution_.model->noise;
-  const LinearSystem linear = linear_part(*run.model_, run.conditions_, theta, run.channels_, Partials::none);
+  const LinearSystem linear = linear_system(*run.model_, run.conditions_, theta, run.channels_, Partials::none);
   return std::make_shared<const InputNoise>(linear, exact_step(linear, run.run_->dt), *inputs, run.tempered_ * run.weight_);
 }
 
@@ -95,7 +95,7 @@ MatrixXd RunResidual::Linearised::white_slopes(const RunResidual& run, const Vec
   // The slope of r^T W r is twice that of the model under the most probable inputs, times W r: theta moves what the measured ones do and, beside it, what their errors do.
   const auto parameters = static_cast<Index>(run.model_->parameters().size());
   const VectorXd left = noise->whitened(rows.rightCols(1));
-  const LinearSystem driven = linear_part(*run.model_, run.conditions_, theta, run.channels_, Partials::all);
+  const LinearSystem driven = linear_system(*run.model_, run.conditions_, theta, run.channels_, Partials::all);
   MatrixXd errors = MatrixXd::Zero(run.inputs_.rows(), run.inputs_.cols());
   const MatrixXd probable = noise->most_probable(left);
   errors.topLeftCorner(probable.rows(), probable.cols()) = probable;

@@ -145,10 +145,7 @@ bool RunResidual::stack_nonlinear_rows(Linearised& lin, const VectorXd& theta, c
 /// c of the linear part alone.
 VectorXd RunResidual::without_laws(const Linearised& lin) const {
   Linearised plain;
-  plain.system = lin.system;
-  const Index measured = plain.system.B.cols() - static_cast<Index>(plain.system.feedback.size());
-  plain.system.feedback.clear();
-  for (DualMatrix* m : {&plain.system.B, &plain.system.D}) *m = m->block(0, 0, m->rows(), measured);
+  plain.system = linear_part(lin.system);
   plain.step = exact_step(plain.system, run_->dt);
   filter_output(plain.system, plain.step);
   prepare_linear(plain);

@@ -140,6 +140,12 @@ TEST(Drive, IsTheSumOfWhatItsCausesDo) {
   EXPECT_LT((all - sum).norm(), round_off * all.norm());
 }
 
+TEST(Drive, RefusesInputsThatTheSystemDoesNotHave) {
+  const DualMatrix rest(MatrixXd::Zero(states, 1));
+  EXPECT_THROW(drive(here, step_here, rest, 5, {}, MatrixXd::Zero(6, inputs - 1), Partials::none), std::invalid_argument);
+  EXPECT_THROW(drive(here, step_here, rest, 5, {}, MatrixXd::Zero(6, inputs + 1), Partials::none), std::invalid_argument);
+}
+
 TEST(FreeResponseRows, TimesAStateAreItsFreeResponse) {
   const DualMatrix start(random_matrix(states, 1, 50));
   const MatrixXd output = coast(here, step_here, start, 75, Partials::none).output;
