@@ -37,12 +37,12 @@ void fit_linear(Trials& trials) {
 }
 
 /// Those that were `fitted`: by the free decays first, the most promising effect first; none after one that leaves nothing of a mismatch too large for two laws to explain alike.
-void fit_nonlinear(const Tell& tell, Trials& trials, const Trial& base, Trials& fitted) {
+void fit_nonlinear(const FitProblem& problem, const Tell& tell, Trials& trials, const Trial& base, Trials& fitted) {
   double least = base.reduced_chi2();
   for (Trial& trial : trials) {
     if (tell) tell(fmt::format("trying {}", fmt::join(trial.effects, " with ")));
     hold_undetermined(trial);
-    follow_nonlinear(trial, base, least);
+    follow_nonlinear(problem, trial, base, least);
     least = std::min(least, trial.reduced_chi2());
     fitted.push_back(std::move(trial));
     if (leaves_nothing(fitted.back()) && base.reduced_chi2() >= nearly_explained) break;
@@ -193,7 +193,7 @@ Trials Selection::try_one_more(const Trial& base, const Strings& hopeless) {
     }
     if (!done || !favours_linear) {  // a decaying tone may leave nothing of what a weak drag does, and explain it worse
       if (done) std::erase_if(others, [&](const Trial& t) { return by_linear >= t.score; });
-      fit_nonlinear(problem_.progress, others, base, followed);
+      fit_nonlinear(fit_problem_, problem_.progress, others, base, followed);
       done = done || any_leaves_nothing(followed);
       if (!done && !favours_linear) fit_anew(fit_problem_, linear);
       const bool decays_have_told = has_decays(base.arrival.joint);  // from first guesses nonlinear laws are not found where their decays do not lead
@@ -266,7 +266,7 @@ Trials Selection::rivals(const Trial& best, const std::string& member) {
     Trial& rival = rivals[i];
     hold_undetermined(rival);
     if (!brings_a_law(rival)) fit_fully(rival, 2);
-    else if (!follow_nonlinear(rival, others, others.reduced_chi2())) return;
+    else if (!follow_nonlinear(fit_problem_, rival, others, others.reduced_chi2())) return;
     if (leaves_nothing(rival) && !decays_decide(rival)) leave_out_terms(rival);
   });
   keep_distinct(rivals);

@@ -41,6 +41,7 @@ bool is_among(const std::vector<std::string>& ids, const std::string& id) { retu
 LawSearch::LawSearch(FitProblem& problem, const Trial& base, std::function<bool(const Trial&)> leaves_something) : problem_(problem), base_(base), leaves_something_(std::move(leaves_something)) {}
 
 std::vector<Trial> LawSearch::one_more(const Trial& base) {
+  const bool driven = all_driven(base.arrival.joint);
   const bool by_decays = has_decays(base.arrival.joint) && left_of_decays(base) > explained;
   if (problem_.progress) problem_.progress("looking for the law of what is missing" + (base.effects.empty() ? std::string() : " beside " + base.effects.back()));
   const BesideUnknownForces beside = beside_unknown_forces(base.arrival.joint);
@@ -75,7 +76,8 @@ std::vector<Trial> LawSearch::one_more(const Trial& base) {
     std::vector<std::string> set = base.effects;
     set.push_back(added[i]);
     tried[i] = std::make_unique<Trial>(prepare(problem_, screening, base, set));
-    if (by_decays && nonlinear(*tried[i])) tried[i]->ruled_out = !fit_decays_first(*tried[i], base, true);
+    if (driven) follow_nonlinear(problem_, *tried[i], base, INFINITY);
+    else if (by_decays && nonlinear(*tried[i])) tried[i]->ruled_out = !fit_decays_first(*tried[i], base, true);
   });
   // Of thousands of samples twice the excess of another is beyond any evidence.
   const auto excess = [](const Trial& t) { return std::max(0.0, left_of_decays(t) - 1); };
@@ -84,7 +86,7 @@ std::vector<Trial> LawSearch::one_more(const Trial& base) {
     if (by_decays && !t->ruled_out) least = std::min(least, std::max(excess(*t), explained - 1));
   for (const auto& t : tried) t->ruled_out = t->ruled_out || (by_decays && excess(*t) > 2 * least);
   in_parallel(tried.size(), [&](std::size_t i) {
-    if (!tried[i]->ruled_out) follow_further(*tried[i], INFINITY);
+    if (!tried[i]->ruled_out && !driven) follow_further(*tried[i], INFINITY);
   });
   std::vector<Trial> fitted;
   for (auto& one : tried)

@@ -346,6 +346,10 @@ bool takes_small_steps(const JointProblem& joint) {
   return false;
 }
 
+bool all_driven(const JointProblem& joint) {
+  return std::all_of(joint.runs().begin(), joint.runs().end(), [](const RunResidual& run) { return run.conditions().force; });
+}
+
 bool has_decays(const JointProblem& joint) { return std::any_of(joint.runs().begin(), joint.runs().end(), is_decay); }
 
 BesideUnknownForces beside_unknown_forces(const JointProblem& joint) {

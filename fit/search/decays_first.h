@@ -8,6 +8,9 @@ namespace unrig {
 /// Whether any of the runs is a free decay or is driven by what is measured: its motion is not estimated.
 bool has_decays(const JointProblem& joint);
 
+/// Whether every run is driven by a force that was measured: where such a run is does not depend on where it began, and a search that grows along the record does not lose its way.
+bool all_driven(const JointProblem& joint);
+
 /// Whether following the model takes several steps a sample in any of the runs (freeplay).
 bool takes_small_steps(const JointProblem& joint);
 

@@ -349,7 +349,11 @@ void follow_further(Trial& trial, double least) {
   if (trial.reduced_chi2() < least) fit_fully(trial, 6);
 }
 
-bool follow_nonlinear(Trial& trial, const Trial& base, double least) {
+bool follow_nonlinear(const FitProblem& problem, Trial& trial, const Trial& base, double least) {
+  if (all_driven(trial.arrival.joint)) {
+    fit_from_first_guesses(problem, trial);
+    return true;
+  }
   trial.ruled_out = !fit_decays_first(trial, base);
   if (trial.ruled_out) return false;
   follow_further(trial, least);
@@ -364,7 +368,7 @@ Arrival arrive_at_effects(const FitProblem& problem) {
     Trial trial = prepare(problem, best, at_work);
     if (!nonlinear(trial)) {
       fit_fully(trial, 2);
-    } else if (Trial followed = trial; follow_nonlinear(followed, best, best.reduced_chi2())) {
+    } else if (Trial followed = trial; follow_nonlinear(problem, followed, best, best.reduced_chi2())) {
       trial = std::move(followed);
     } else {
       measure(trial);  // where the law's size went astray it is sought again from where it started

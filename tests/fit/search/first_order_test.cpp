@@ -148,7 +148,7 @@ TEST(Screening, ANonlinearRunBeginsWhereTheFitWithoutTheEffectStands) {
   for (const char* run : {"dry_pluck.csv", "wet_pluck.csv", "step_b.csv"}) problem.runs.push_back(read_run(test::source_path("sample_data/campaigns/drag/") + run));
   const Trial without = fit_baseline(problem);
   Trial drag = prepare(problem, without, {"quadratic-drag"});
-  ASSERT_TRUE(follow_nonlinear(drag, without, without.reduced_chi2()));
+  ASSERT_TRUE(follow_nonlinear(problem, drag, without, without.reduced_chi2()));
   ASSERT_LT(drag.reduced_chi2(), explained);
   const auto both = std::make_shared<const AeroelasticModel>(model_of(problem.rig, problem.runs, problem.circulation, {"quadratic-drag", "gauge-drift"}));
   JointProblem with = Screening(problem, drag.arrival).extend(both, {"gauge-drift"}).arrival.joint;
