@@ -313,20 +313,18 @@ bool is_undetermined(const FitProblem& problem, const Trial& set) {
   });
 }
 
+/// Laws beside `base`, which the ranking gets.
+std::vector<Trial> search_laws(FitProblem& fit_problem, const Trial& baseline, const Trial& base, LawSearch::Listed listed, Selection& selection) {
+  std::vector<Trial> tried = LawSearch(fit_problem, base, leaves_something, listed).search();
+  for (const Trial& t : tried) selection.add({t.effects, t.reduced_chi2(), bic_difference(t, baseline), 0, 0});
+  return tried;
+}
+
 /// The law of what no effect explains: beside nothing, since an effect of the list may stand in for it, and beside the best set. A law that is on the list goes by its id: an effect of the list comes first where
 /// no form is decisively better. What leaves nothing comes before the rest: of sets that set decays aside the evidence is that of the other runs. Where the first is named, leaves nothing or is no worse than any
 /// set that was tried, and is decisively better than what was `found`, it is in `found`. An equation of which the runs determine nothing is no answer.
-std::optional<Laws> look_for_laws(const DiagnoseProblem& problem, FitProblem& fit_problem, const Setting& files, const Trial& baseline, Selection& selection, FoundSet& found) {
-  Laws laws;
-  const auto look_beside = [&](const Trial& base) {
-    LawSearch search(fit_problem, base, leaves_something);
-    for (Trial& t : search.search()) {
-      selection.add({t.effects, t.reduced_chi2(), bic_difference(t, baseline), 0, 0});
-      laws.tried.push_back(std::move(t));
-    }
-  };
-  look_beside(baseline);
-  if (!found.best.effects.empty()) look_beside(found.best);
+std::optional<Laws> choose_law(const DiagnoseProblem& problem, FitProblem& fit_problem, const Setting& files, const Trial& baseline, std::vector<Trial> tried, const Selection& selection, FoundSet& found) {
+  Laws laws{std::move(tried), {}};
   std::stable_sort(laws.tried.begin(), laws.tried.end(), [](const Trial& a, const Trial& b) { return bic_difference(a, b) < 0; });
   fit_problem.rig.laws.clear();
   std::vector<Trial> undetermined;  // no answers, but not refuted either
@@ -414,7 +412,19 @@ Diagnosis diagnose_in_order(const DiagnoseProblem& problem, bool numbers_known) 
     return true;
   };
   Trial best_set = baseline;
-  time.spend([&] { best_set = selection->best_set(noise_or_rig); });
+  // Far from the noise a law shows in the force that is missing, in a second: where one leaves nothing, no set of effects is looked for.
+  const bool may_find_laws = problem.laws && !problem.verdict_only && problem.effects.empty() && d.mismatch.found;
+  const bool described_already = description && description->left < explained;
+  std::vector<Trial> laws_alone;
+  std::optional<Laws> laws;
+  FoundSet found = look_at(problem, files, baseline, files, baseline, 0);
+  if (may_find_laws && !described_already && baseline.reduced_chi2() > nearly_explained)
+    time.spend([&] {
+      laws_alone = search_laws(fit_problem, baseline, baseline, LawSearch::Listed::all, *selection);
+      if (std::any_of(laws_alone.begin(), laws_alone.end(), [](const Trial& t) { return !leaves_something(t); })) laws = choose_law(problem, fit_problem, files, baseline, laws_alone, *selection, found);
+    });
+  if (!laws) fit_problem.rig.laws.clear();
+  if (!laws) time.spend([&] { best_set = selection->best_set(noise_or_rig); });
   if (anew) {
     tell("trying what may be missing, in noise of the colour that is left");
     d.mismatch = locate_mismatch(baseline.arrival.joint);
@@ -423,11 +433,19 @@ Diagnosis diagnose_in_order(const DiagnoseProblem& problem, bool numbers_known) 
     time.spend([&] { best_set = selection->best_set(noise_or_rig); });
   }
   if (!problem.verdict_only) d.maps = residual_maps(baseline.arrival.joint, d.mismatch.runs);
-  FoundSet found = look_at(problem, files, baseline, files, std::move(best_set), 0);
+  if (!laws) found = look_at(problem, files, baseline, files, std::move(best_set), 0);
   const bool described = description && weigh(problem, files, baseline, *description, std::move(beside), *selection, time, found);
-  std::optional<Laws> laws;
-  if (problem.laws && !problem.verdict_only && problem.effects.empty() && d.mismatch.found && !described && !found.explains())
-    time.spend([&] { laws = look_for_laws(problem, fit_problem, files, baseline, *selection, found); });
+  if (described && laws) {
+    laws.reset();
+    fit_problem.rig.laws.clear();
+  }
+  if (may_find_laws && !laws && !described && !found.explains())
+    time.spend([&] {
+      std::vector<Trial> tried = laws_alone.empty() ? search_laws(fit_problem, baseline, baseline, LawSearch::Listed::only_if_named, *selection) : std::move(laws_alone);
+      if (!found.best.effects.empty())
+        for (Trial& t : search_laws(fit_problem, baseline, found.best, LawSearch::Listed::only_if_named, *selection)) tried.push_back(std::move(t));
+      laws = choose_law(problem, fit_problem, files, baseline, std::move(tried), *selection, found);
+    });
   if (time.is_up() && !laws) fit_problem.rig.laws.clear();  // a search that was stopped leaves its forms there
   const Trial& best = found.best;
   d.ranking = selection->ranking();

@@ -22,7 +22,7 @@ using Strings = std::vector<std::string>;
 using Trials = std::vector<Trial>;  // the best first once they are fitted
 using Tell = std::function<void(const std::string&)>;
 
-constexpr double nearly_explained = 10, twice_the_noise = 2;
+constexpr double twice_the_noise = 2;
 constexpr double half_way = 0.5;
 constexpr double hardly_less = 0.9;  // of the excess: an effect that leaves so much of it is not what is missing
 constexpr std::size_t most_refits = 5, most_in_full = 2;
