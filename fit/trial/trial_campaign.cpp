@@ -6,6 +6,7 @@
 
 #include "core/effects/effect.h"
 #include "core/files/error.h"
+#include "core/law/law_effect.h"
 #include "core/model/simulate.h"
 #include "core/propagate/exact_step.h"
 
@@ -36,15 +37,6 @@ VectorXd draw_rig(const AeroelasticModel& model, Random& random) {
   set("torsion.damping_ratio", 0.01, 0.03);
   set("apparent_mass_coefficient", 0.9, 1.2);
   return theta;
-}
-
-/// What drives the same rig in one run, with and without what is hidden.
-SimulateProblem problem_of(const AeroelasticModel& model, const VectorXd& theta, const PlannedRun& planned) {
-  SimulateProblem problem{model, theta, planned.fine, {}, {}, {}};
-  problem.theta[model.index("normal_force_slope")] = planned.slope;
-  if (planned.release > 0) problem.release_load = planned.release;
-  else problem.steady_normal_force = planned.steady;
-  return problem;
 }
 
 double rms(const VectorXd& x) { return std::sqrt(x.squaredNorm() / static_cast<double>(x.size())); }
@@ -101,16 +93,6 @@ double trace_of(const Alone& effect, const PlannedRun& planned, const VectorXd& 
   return apart(simulate(problem).run, simulate(problem_of(effect.known, theta, planned)).run, effect.known.rig(), planned);
 }
 
-/// Every mode that half the simulated sampling rate lets through, in the densest fluid, circulation within 1e-6.
-AeroelasticModel whole_model(const Rig& rig, const std::vector<PlannedRun>& runs) {
-  double nyquist = 0, density = 0;
-  for (const PlannedRun& run : runs) {
-    nyquist = std::max(nyquist, 0.5 / run.fine.dt);
-    density = std::max(density, run.fine.density);
-  }
-  return {rig, make_basis(rig, nyquist, density), wagner(Wagner::within_1e6)};
-}
-
 double first_release(const std::vector<PlannedRun>& runs) {
   constexpr double usual = 20;
   const auto pluck = std::find_if(runs.begin(), runs.end(), [](const PlannedRun& run) { return run.release > 0; });
@@ -143,7 +125,7 @@ MatrixXd walking_phases(const Strings& hidden, const AeroelasticModel& bare, con
   for (const std::string& id : hidden) {
     const AeroelasticModel one = bare.with_effects({id});
     const auto count = static_cast<Index>(one.system(conditions_of(problem.run), one.start_values(), {"gauge"}).exogenous.size());
-    if (effect(id).noise && count == 2) {
+    if (effect(bare.rig(), id).noise && count == 2) {
       if (steps.size() == 0) steps = MatrixXd::Zero(problem.run.samples(), static_cast<Index>(system.exogenous.size()));
       const std::vector<Index> own{system.exogenous[static_cast<std::size_t>(first)], system.exogenous[static_cast<std::size_t>(first) + 1]};
       const Eigen::Matrix2d on = step.transition.value(own, own);
@@ -178,6 +160,23 @@ Run recorded(const Run& fine, const PlannedRun& planned, const Rig& rig, const L
 
 }  // namespace
 
+AeroelasticModel whole_model(const Rig& rig, const std::vector<PlannedRun>& runs) {
+  double nyquist = 0, density = 0;
+  for (const PlannedRun& run : runs) {
+    nyquist = std::max(nyquist, 0.5 / run.fine.dt);
+    density = std::max(density, run.fine.density);
+  }
+  return {rig, make_basis(rig, nyquist, density), wagner(Wagner::within_1e6)};
+}
+
+SimulateProblem problem_of(const AeroelasticModel& model, const VectorXd& theta, const PlannedRun& planned) {
+  SimulateProblem problem{model, theta, planned.fine, {}, {}, {}};
+  problem.theta[model.index("normal_force_slope")] = planned.slope;
+  if (planned.release > 0) problem.release_load = planned.release;
+  else problem.steady_normal_force = planned.steady;
+  return problem;
+}
+
 void check_for_trials(const Rig& rig) {
   if (rig.is_modal() || rig.gauge_element == 0 || rig.calibration_element == 0 || rig.submerged.empty())
     throw InputError({rig.file, 0}, "the rig cannot be plucked and pitched", "wanted a beam rig with a gauge, a calibration element and a submerged section", "");
@@ -193,17 +192,19 @@ TrialCampaign draw_campaign(const Rig& rig, const Strings& hidden, const std::ve
   const AeroelasticModel bare = whole_model(whole, runs), model = bare.with_effects(hidden);
   // Of hidden modes the trace is what the truth has beside a rig of one.
   const AeroelasticModel one_mode(whole, make_basis(whole, Index{1}, bare.basis().torsion_modes), bare.circulation());
-  const bool modes_hidden = std::any_of(hidden.begin(), hidden.end(), [](const std::string& id) { return effect(id).enriches_basis; });
+  const bool modes_hidden = std::any_of(hidden.begin(), hidden.end(), [&](const std::string& id) { return effect(rig, id).enriches_basis; });
   if (modes_hidden) campaign.rig.normal.modes = 1;
 
   const VectorXd rig_theta = draw_rig(bare, random);
   VectorXd theta = model.start_values();
   theta.head(rig_theta.size()) = rig_theta;
   for (const std::string& id : hidden) {
-    const VectorXd p = draw_parameters(effect(id), bare, first_release(runs), random);
+    const VectorXd p = draw_parameters(effect(rig, id), bare, first_release(runs), random);
     theta.segment(rig_theta.size() + static_cast<Index>(campaign.parameters.size()), p.size()) = p;
     campaign.parameters.insert(campaign.parameters.end(), p.begin(), p.end());
   }
+  for (Index k = 0; k < theta.size(); ++k)
+    if (const Parameter& p = model.parameters()[static_cast<std::size_t>(k)]; !p.per_run) campaign.truth[p.name] = theta[k];
   std::vector<SimulateProblem> problems;
   for (const PlannedRun& planned : runs) problems.push_back(problem_of(model, theta, planned));
   draw_signals(runs, problems, random);
@@ -216,7 +217,7 @@ TrialCampaign draw_campaign(const Rig& rig, const Strings& hidden, const std::ve
   }
   campaign.sizes.assign(hidden.size(), 0);
   for (std::size_t k = 0; k < hidden.size(); ++k) {
-    const Alone alone = beside_the_rig(hidden[k], effect(hidden[k]).enriches_basis ? one_mode : bare, bare, model, theta);
+    const Alone alone = beside_the_rig(hidden[k], effect(rig, hidden[k]).enriches_basis ? one_mode : bare, bare, model, theta);
     for (std::size_t r = 0; r < runs.size(); ++r) campaign.sizes[k] = std::max(campaign.sizes[k], trace_of(alone, runs[r], own_signals(hidden, k, bare, problems[r])));
   }
   misread(laboratory, campaign.rig, campaign.runs, random);
