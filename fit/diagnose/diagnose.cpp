@@ -16,6 +16,7 @@
 #include "core/rig/fingerprint.h"
 #include "core/numerics/time_limit.h"
 #include "fit/diagnose/as_given.h"
+#include "fit/diagnose/exact_model.h"
 #include "fit/diagnose/explanation.h"
 #include "fit/diagnose/rig_description.h"
 #include "fit/diagnose/selection.h"
@@ -350,6 +351,14 @@ std::optional<Laws> choose_law(const DiagnoseProblem& problem, FitProblem& fit_p
   return laws;
 }
 
+/// The exact model of a trial, against what was tried before laws.
+std::unique_ptr<ExactModel> held_against(const HiddenLaw& hidden, const FitProblem& files, const Trial& base, const Selection& selection, const FoundSet& found) {
+  auto exact = std::make_unique<ExactModel>(hidden, files, base);
+  for (const Trial& t : selection.tried()) exact->hold_against(t);
+  exact->hold_against(found.best);
+  return exact;
+}
+
 /// Laws among `set`, told as such; the rig keeps only those at work.
 void tell_laws(FitProblem& fit_problem, const Laws& laws, const FoundSet& found, std::vector<MissingEffect>& set, Diagnosis& d) {
   for (MissingEffect& m : set)
@@ -415,13 +424,13 @@ Diagnosis diagnose_in_order(const DiagnoseProblem& problem, bool numbers_known) 
   // Far from the noise a law shows in the force that is missing, in a second: where one leaves nothing, no set of effects is looked for.
   const bool may_find_laws = problem.laws && !problem.verdict_only && problem.effects.empty() && d.mismatch.found;
   const bool described_already = description && description->left < explained;
-  std::vector<Trial> laws_alone;
+  std::vector<Trial> laws_tried;
   std::optional<Laws> laws;
   FoundSet found = look_at(problem, files, baseline, files, baseline, 0);
   if (may_find_laws && !described_already && baseline.reduced_chi2() > nearly_explained)
     time.spend([&] {
-      laws_alone = search_laws(fit_problem, baseline, baseline, LawSearch::Listed::all, *selection);
-      if (std::any_of(laws_alone.begin(), laws_alone.end(), [](const Trial& t) { return !leaves_something(t); })) laws = choose_law(problem, fit_problem, files, baseline, laws_alone, *selection, found);
+      laws_tried = search_laws(fit_problem, baseline, baseline, LawSearch::Listed::all, *selection);
+      if (std::any_of(laws_tried.begin(), laws_tried.end(), [](const Trial& t) { return !leaves_something(t); })) laws = choose_law(problem, fit_problem, files, baseline, laws_tried, *selection, found);
     });
   if (!laws) fit_problem.rig.laws.clear();
   if (!laws) time.spend([&] { best_set = selection->best_set(noise_or_rig); });
@@ -439,15 +448,20 @@ Diagnosis diagnose_in_order(const DiagnoseProblem& problem, bool numbers_known) 
     laws.reset();
     fit_problem.rig.laws.clear();
   }
+  std::unique_ptr<ExactModel> exact;
+  if (problem.hidden) exact = held_against(*problem.hidden, described ? *description->problem : fit_problem, described ? description->trial : baseline, *selection, found);
   if (may_find_laws && !laws && !described && !found.explains())
     time.spend([&] {
-      std::vector<Trial> tried = laws_alone.empty() ? search_laws(fit_problem, baseline, baseline, LawSearch::Listed::only_if_named, *selection) : std::move(laws_alone);
+      if (laws_tried.empty()) laws_tried = search_laws(fit_problem, baseline, baseline, LawSearch::Listed::only_if_named, *selection);
       if (!found.best.effects.empty())
-        for (Trial& t : search_laws(fit_problem, baseline, found.best, LawSearch::Listed::only_if_named, *selection)) tried.push_back(std::move(t));
-      laws = choose_law(problem, fit_problem, files, baseline, std::move(tried), *selection, found);
+        for (Trial& t : search_laws(fit_problem, baseline, found.best, LawSearch::Listed::only_if_named, *selection)) laws_tried.push_back(std::move(t));
+      laws = choose_law(problem, fit_problem, files, baseline, laws_tried, *selection, found);
     });
+  for (const Trial& t : laws_tried)
+    if (exact) exact->hold_against(t);
   if (time.is_up() && !laws) fit_problem.rig.laws.clear();  // a search that was stopped leaves its forms there
   const Trial& best = found.best;
+  if (exact) d.truth = exact->told(*found.setting.heldout);
   d.ranking = selection->ranking();
   d.remaining = found.remaining;
   d.unexplained = d.mismatch.found && !found.explains();

@@ -1,9 +1,11 @@
 #pragma once
 #include <array>
 #include <functional>
+#include <map>
 #include <memory>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "core/rig/rig.h"
@@ -23,6 +25,19 @@ constexpr double enough_to_name = 0.97;  ///< share of the excess that effects m
 /// Why the best set of effects is named or not.
 enum class Naming { named, removes_too_little, only_signals, does_not_predict };
 
+/// What a simulated campaign hides, for `unrig trial`.
+struct HiddenLaw {
+  std::shared_ptr<const Effect> law;
+  std::map<std::string, double> truth;  ///< parameters by name, the rig's and the law's
+};
+
+/// What an exact model of the truth comes to, fitted from the truth; it has no part in the verdict.
+struct AgainstTruth {
+  double reduced_chi2 = 0;
+  std::vector<double> heldout;  ///< r.m.s. left of DiagnoseProblem::heldout, of the first fitted channel
+  std::vector<std::pair<std::vector<std::string>, double>> behind;  ///< sets that were tried, and by how much their twice the log likelihood is below that of the truth
+};
+
 /// Where do these recordings and the model of their rig differ, and which physics was left out?
 struct DiagnoseProblem {
   Rig rig;
@@ -33,6 +48,7 @@ struct DiagnoseProblem {
   std::vector<std::string> effects;   ///< candidates; empty: all that can act in these runs
   bool laws = true;                   ///< where no effect explains the runs and no candidates are named, their law is looked for (fit/laws/law_search.h)
   double limit = 0;                   ///< processor time after which the search ends with what it has found [s]; 0: none
+  std::optional<HiddenLaw> hidden;    ///< of a trial: all that is tried is held against it
   std::function<void(const std::string&)> progress;
 };
 
@@ -92,6 +108,7 @@ struct Diagnosis {
   FitResult before;   ///< with nothing missing, all runs at their full weight, as `unrig fit` has it
   FitResult after;
   std::vector<std::shared_ptr<const Effect>> laws;  ///< that are at work in `after`
+  std::optional<AgainstTruth> truth;  ///< of a trial
   std::vector<MissingForce> missing_force;  ///< where something is unexplained: what would explain it
   bool stopped = false;  ///< by the limit of time: sets that were not tried may explain more
   double seconds = 0;
