@@ -5,6 +5,8 @@
 
 Size: r.m.s. of what the hidden effect does to the run that it changes most, over the noise; of two, each beside the bare rig, the smaller one. Right: exactly what was hidden was named, or nothing where nothing
 was. As good: another set was named and the hidden one was reported with it, as one that these recordings cannot tell from it.
+
+Of `unrig trial --law`: right is the hidden law by itself, or the same under another name; wrong alone, something named without it and without it among the rivals; in company, it is named beside something that is not there.
 """
 import collections
 import json
@@ -50,8 +52,50 @@ def nine_in_ten(trials):
     return f"{smallest:.2g}" if smallest else "-"
 
 
+def of_law(trial):
+    """What became of a campaign with a law."""
+    law = trial["law"]
+    for key, name in (("equation_right", "right"), ("among_rivals", "among rivals"), ("curve", "curve"), ("in_company", "in company"), ("wrong_alone", "wrong alone")):
+        if law[key]:
+            return name
+    return "unexplained" if law["unexplained"] else "nothing seen"
+
+
+def print_laws(results):
+    """The table of `unrig trial --law`."""
+    trials = [t for r in results for t in r["trials"]]
+    laws = [t for t in trials if "law" in t]
+    decided = [t for t in laws if (t["law"]["exact_ahead"] or 0) >= 10]
+    told = [t["law"]["heldout_over_exact"] for t in laws if t["law"]["heldout_over_exact"] is not None]
+    named = sorted(t["law"]["rivals"] for t in laws if t["law"]["named"])
+    right = sum(of_law(t) in ("right", "among rivals") for t in decided)
+    print(f"{len(trials)} campaigns (seeds {', '.join(str(r['seed']) for r in results)}), {sum('failure' in t for t in trials)} failed\n")
+    print(f"- an exact model is ahead by 10 or more in twice the log likelihood: {share(len(decided), len(laws))}; of these right or among the rivals {share(right, len(decided))}")
+    print(f"- wrong alone: {share(sum(t['law']['wrong_alone'] for t in laws), len(laws))}; class right: {share(sum(t['law']['class_right'] for t in laws), len(laws))}")
+    if named:
+        print(f"- rivals where something is named: {named[len(named) // 2]} in the median, {named[-1]} at most")
+    print(f"- runs held out at most 1.2 times what the exact model leaves: {share(sum(ratio <= 1.2 for ratio in told), len(told))}")
+    seconds = sorted(t["seconds"] for t in trials if "seconds" in t)
+    if seconds:
+        print(f"- a diagnosis took {seconds[len(seconds) // 2]:.0f} s in the median, {seconds[-1]:.0f} s at most")
+    columns = ["right", "among rivals", "curve", "in company", "wrong alone", "unexplained", "nothing seen"]
+    for outside in (False, True):
+        own = [t for t in laws if t["law"]["outside"] == outside]
+        if not own:
+            continue
+        print(f"\n| {'outside the dictionary' if outside else 'of the dictionary'} | campaigns | ahead by 10 | " + " | ".join(columns) + " | named | exact ahead | held out |\n" + "| --- " * (len(columns) + 6) + "|")
+        for name in sorted({t["hidden"][0] for t in own}):
+            row = [t for t in own if t["hidden"] == [name]]
+            count = collections.Counter(of_law(t) for t in row)
+            found = ", ".join(sorted({" + ".join(t["found"]) for t in row if t["found"]})).replace("law:", "")
+            each = [", ".join("-" if t["law"][key] is None else f"{t['law'][key]:.{digits}g}" for t in row) for key, digits in (("exact_ahead", 2), ("heldout_over_exact", 3))]
+            print(f"| {name.removeprefix('law:')} | {len(row)} | {sum(t in decided for t in row)} | " + " | ".join(str(count[c]) for c in columns) + f" | {found} | {' | '.join(each)} |")
+
+
 def main():
     results = [json.loads(pathlib.Path(name).read_text()) for name in sys.argv[1:]]
+    if any("laws" in r for r in results):
+        return print_laws(results)
     trials = [t for r in results for t in r["trials"]]
     nulls, hidden = [t for t in trials if not t["hidden"]], [t for t in trials if t["hidden"]]
     visible = [t for t in hidden if size(t) >= VISIBLE]

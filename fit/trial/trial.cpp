@@ -10,10 +10,13 @@
 #include <mutex>
 #include <optional>
 
+#include "core/effects/effect.h"
 #include "core/files/error.h"
+#include "core/law/law_effect.h"
 #include "core/rig/fingerprint.h"
 #include "core/numerics/in_parallel.h"
 #include "fit/diagnose/diagnose.h"
+#include "fit/trial/hidden_law.h"
 #include "fit/trial/trial_campaign.h"
 #include "fit/trial/trial_files.h"
 #include "fit/effect_option.h"
@@ -41,10 +44,32 @@ Strings hidden_in(const Strings& effects, std::size_t trial, bool pairs, std::mt
   return hidden;
 }
 
-constexpr double usual_noise = 0.03;  // N
+constexpr double usual_noise = 0.03, loudest_of_laws = 0.3;  // N
 
-std::vector<PlannedRun> plan(const TrialProblem& problem, std::mt19937_64& random) {
-  return problem.recordings.empty() ? draw_runs(problem.noise.value_or(usual_noise), random) : runs_like(problem.rig, problem.recordings, problem.noise, random);
+std::optional<double> draw_noise_level(const TrialProblem& problem, std::mt19937_64& random) {
+  if (problem.noise || !problem.laws || !problem.recordings.empty()) return problem.noise;
+  return log_between(random, usual_noise, loudest_of_laws);
+}
+
+std::vector<PlannedRun> plan(const TrialProblem& problem, std::optional<double> noise, std::mt19937_64& random) {
+  return problem.recordings.empty() ? draw_runs(noise.value_or(usual_noise), random) : runs_like(problem.rig, problem.recordings, noise, random);
+}
+
+/// Of a plan drawn anew the last pluck, from a smaller load, and the last step from an attached flow: not to be fitted.
+std::vector<PlannedRun> plan_heldout(const TrialProblem& problem, std::optional<double> noise, std::mt19937_64& random) {
+  constexpr double attached = 0.2;  // rad
+  std::vector<PlannedRun> again = plan(problem, noise, random), heldout;
+  for (const bool pluck : {true, false}) {
+    const auto is_one = [&](const PlannedRun& run) { return (run.release > 0) == pluck && std::abs(run.fine.channel("alpha").value[0]) < attached; };
+    const auto last = std::find_if(again.rbegin(), again.rend(), is_one);
+    if (last == again.rend()) continue;
+    heldout.push_back(*last);
+    PlannedRun& run = heldout.back();
+    run.fine.file = "heldout_" + run.fine.file;
+    run.fine.name = "heldout " + run.fine.name;
+    run.release *= between(random, 0.6, 0.9);
+  }
+  return heldout;
 }
 
 /// Without readings, in the recorded steps.
@@ -57,34 +82,85 @@ std::vector<Run> recorded_runs(const std::vector<PlannedRun>& planned) {
   return runs;
 }
 
+/// A campaign with a law in place of effects: the rig that has it, runs to fit and, behind them, runs to hold out.
+struct LawPlan {
+  Law law;
+  Rig rig;
+  std::vector<PlannedRun> runs;
+  std::size_t heldout = 0;
+};
+
+LawPlan plan_law(const TrialProblem& problem, std::size_t trial, std::mt19937_64& random) {
+  LawPlan planned;
+  const std::optional<double> noise = draw_noise_level(problem, random);
+  planned.runs = plan(problem, noise, random);
+  const Reached reached = reached_by(problem.rig, planned.runs);
+  const std::vector<Law> forms = laws_to_hide(problem.rig, reached, problem.outside);
+  planned.law = draw_law(forms[trial % forms.size()], reached, random);
+  planned.rig = problem.rig;
+  add_law(planned.rig, planned.law);
+  const std::vector<PlannedRun> heldout = plan_heldout(problem, noise, random);
+  planned.heldout = heldout.size();
+  planned.runs.insert(planned.runs.end(), heldout.begin(), heldout.end());
+  return planned;
+}
+
+TrialCampaign draw(const TrialProblem& problem, const Rig& rig, const std::vector<PlannedRun>& planned, std::mt19937_64& random, TrialOutcome& outcome) {
+  const Laboratory laboratory = problem.ideal ? ideal_laboratory() : draw_laboratory(problem.rig, recorded_runs(planned), random);
+  outcome.noise = to_string(laboratory.noise);
+  outcome.misread = laboratory.misread;
+  TrialCampaign campaign = draw_campaign(rig, outcome.hidden, planned, laboratory, random);
+  outcome.parameters = campaign.parameters;
+  outcome.size = campaign.size;
+  outcome.sizes = campaign.sizes;
+  return campaign;
+}
+
+void take_verdict(const Diagnosis& d, TrialOutcome& outcome) {
+  for (const MissingEffect& m : d.missing) outcome.found.push_back(m.effect);
+  outcome.equivalent = d.equivalent;
+  outcome.mismatch = d.mismatch.found;
+  outcome.unexplained = d.unexplained;
+  outcome.seconds = d.seconds;
+  for (const Candidate& c : d.ranking)
+    if (!outcome.found.empty() && name_of(c.effects) == name_of(outcome.found)) outcome.probability = c.probability;
+}
+
+void try_effects(const TrialProblem& problem, const Strings& effects, std::mt19937_64& random, TrialOutcome& outcome) {
+  const TrialCampaign campaign = draw(problem, problem.rig, plan(problem, problem.noise, random), random, outcome);
+  DiagnoseProblem diagnosis;
+  diagnosis.rig = campaign.rig;
+  diagnosis.runs = campaign.runs;
+  diagnosis.effects = effects;
+  diagnosis.verdict_only = true;
+  if (problem.outside) std::erase_if(diagnosis.effects, [&](const std::string& id) { return has(outcome.hidden, id); });
+  take_verdict(diagnose(diagnosis), outcome);
+}
+
+void try_law(const TrialProblem& problem, std::mt19937_64& random, TrialOutcome& outcome) {
+  const LawPlan planned = plan_law(problem, outcome.trial, random);
+  outcome.hidden = {planned.law.id()};
+  const TrialCampaign campaign = draw(problem, planned.rig, planned.runs, random, outcome);
+  const auto first_heldout = campaign.runs.end() - static_cast<std::ptrdiff_t>(planned.heldout);
+  DiagnoseProblem diagnosis;
+  diagnosis.rig = campaign.rig;
+  diagnosis.rig.laws.clear();
+  diagnosis.runs.assign(campaign.runs.begin(), first_heldout);
+  diagnosis.heldout.assign(first_heldout, campaign.runs.end());
+  diagnosis.hidden = HiddenLaw{planned.rig.laws.back(), campaign.truth};
+  const Diagnosis d = diagnose(diagnosis);
+  take_verdict(d, outcome);
+  outcome.law = judged(planned.law, problem.outside, planned.runs.front().noise, !outcome.misread.empty(), d);
+}
+
 TrialOutcome run_trial(const TrialProblem& problem, const Strings& effects, std::size_t trial) {
   std::mt19937_64 random = random_of(problem.seed, trial);
   TrialOutcome outcome;
   outcome.trial = trial;
-  if (!problem.nulls) outcome.hidden = hidden_in(effects, trial, problem.pairs, random);
+  if (!problem.nulls && !problem.laws) outcome.hidden = hidden_in(effects, trial, problem.pairs, random);
   try {
-    const std::vector<PlannedRun> planned = plan(problem, random);
-    const Laboratory laboratory = problem.ideal ? ideal_laboratory() : draw_laboratory(problem.rig, recorded_runs(planned), random);
-    outcome.noise = to_string(laboratory.noise);
-    outcome.misread = laboratory.misread;
-    const TrialCampaign campaign = draw_campaign(problem.rig, outcome.hidden, planned, laboratory, random);
-    outcome.parameters = campaign.parameters;
-    outcome.size = campaign.size;
-    outcome.sizes = campaign.sizes;
-    DiagnoseProblem diagnosis;
-    diagnosis.rig = campaign.rig;
-    diagnosis.runs = campaign.runs;
-    diagnosis.effects = effects;
-    diagnosis.verdict_only = true;
-    if (problem.outside) std::erase_if(diagnosis.effects, [&](const std::string& id) { return has(outcome.hidden, id); });
-    const Diagnosis d = diagnose(diagnosis);
-    for (const MissingEffect& m : d.missing) outcome.found.push_back(m.effect);
-    outcome.equivalent = d.equivalent;
-    outcome.mismatch = d.mismatch.found;
-    outcome.unexplained = d.unexplained;
-    outcome.seconds = d.seconds;
-    for (const Candidate& c : d.ranking)
-      if (!outcome.found.empty() && name_of(c.effects) == name_of(outcome.found)) outcome.probability = c.probability;
+    if (problem.laws) try_law(problem, random, outcome);
+    else try_effects(problem, effects, random, outcome);
   } catch (const std::exception& e) {
     outcome.failure = e.what();
   }
@@ -154,6 +230,10 @@ bool TrialOutcome::among_equivalent() const {
 }
 
 void tally(TrialResult& result) {
+  std::vector<const LawOutcome*> laws;
+  for (const TrialOutcome& o : result.outcomes)
+    if (o.law) laws.push_back(&*o.law);
+  if (!laws.empty()) result.laws = count_laws(laws);
   for (const TrialOutcome& o : result.outcomes) {
     const std::string found = !o.failure.empty() ? "failed" : o.found.empty() && o.unexplained ? "unexplained" : name_of(o.found);
     ++result.confusion[name_of(o.hidden)][found];
@@ -178,11 +258,15 @@ std::string name_of(Strings effects) {
   return effects.empty() ? "nothing" : fmt::format("{}", fmt::join(effects, " + "));
 }
 
-TrialResult run_trials(const TrialProblem& problem) {
-  check_for_trials(problem.rig);
+namespace {
+
+/// Ids of what is hidden in turn in runs like these.
+Strings hidden_in_turn(const TrialProblem& problem, const std::vector<PlannedRun>& planned) {
   Strings ids = problem.effects;
-  std::mt19937_64 any;
-  const std::vector<PlannedRun> planned = plan(problem, any);
+  if (problem.laws) {
+    for (const Law& law : laws_to_hide(problem.rig, reached_by(problem.rig, planned), problem.outside)) ids.push_back(law.id());
+    return ids;
+  }
   const std::vector<Run> runs = recorded_runs(planned);
   Rig hiding = problem.rig;
   hiding.normal.modes = 1;  // as the rig of a campaign that hides modes
@@ -190,6 +274,16 @@ TrialResult run_trials(const TrialProblem& problem) {
   else refuse_idle("--effects", ids, hiding, runs);
   if (const std::size_t at_a_time = problem.pairs ? 2 : 1; problem.outside && ids.size() <= at_a_time)
     throw InputError({"--outside", 0}, fmt::format("{} to hide in turn, {} at a time", ids.size(), at_a_time), "wanted candidates beside what is hidden", "Name more of --effects.");
+  return ids;
+}
+
+}  // namespace
+
+TrialResult run_trials(const TrialProblem& problem) {
+  check_for_trials(problem.rig);
+  std::mt19937_64 any;
+  const std::vector<PlannedRun> planned = plan(problem, problem.noise, any);
+  const Strings ids = hidden_in_turn(problem, planned);
   TrialResult result;
   result.seed = problem.seed;
   result.effects = ids;
@@ -197,6 +291,7 @@ TrialResult run_trials(const TrialProblem& problem) {
   result.shard = problem.shard;
   result.shards = problem.shards;
   for (const PlannedRun& run : planned) result.noise = std::max(result.noise, run.noise);
+  if (problem.laws && !problem.noise && problem.recordings.empty()) result.noise = loudest_of_laws;
   result.rig_file = problem.rig.file;
   result.rig_fingerprint = fingerprint(problem.rig);
   for (const Run& run : problem.recordings) {

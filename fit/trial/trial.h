@@ -8,6 +8,7 @@
 #include "core/files/provenance.h"
 #include "core/rig/rig.h"
 #include "core/run/run.h"
+#include "fit/trial/law_outcome.h"
 #include "fit/trial/shard.h"
 
 namespace unrig {
@@ -19,11 +20,12 @@ struct TrialProblem {
   int trials = 20;
   bool pairs = false;                ///< hide two effects at a time
   bool nulls = false;                ///< hide nothing, in no campaign: how often is something named that is not there?
-  bool outside = false;              ///< what is hidden is not among the candidates: nothing should be named
+  bool outside = false;              ///< what is hidden is not among the candidates, or no law that the dictionary can say: nothing should be named, or a curve
+  bool laws = false;                 ///< hide a law in every campaign (fit/trial/hidden_law.h), which a full diagnosis with two further runs held out looks for; no `effects`
   bool ideal = false;                ///< white noise, exact files and steady signals instead of what a laboratory adds (fit/trial/laboratory.h)
   unsigned seed = 1;
   std::vector<Run> recordings;       ///< whose conditions, motion, sampling and noise the simulated runs repeat; none: runs are drawn
-  std::optional<double> noise;       ///< of the gauge [N]; without it that of the recordings, or 0.03
+  std::optional<double> noise;       ///< of the gauge [N]; without it that of the recordings, or 0.03; of laws 0.03 to 0.3, drawn
   std::size_t shard = 1, shards = 1; ///< only the trials i with i mod shards = shard - 1
   HandOut hand_out;                  ///< if it is set: which trials it says, one after the other
   std::string cases;                 ///< folder in which every trial's outcome is kept and found again; empty: none
@@ -42,6 +44,7 @@ struct TrialOutcome {
   std::string misread;         ///< group of the numbers by which the files are off; empty: none
   std::optional<double> probability;  ///< that the diagnosis gives what it found; none where nothing is named
   bool mismatch = false, unexplained = false;
+  std::optional<LawOutcome> law;  ///< of a campaign with a law
   double seconds = 0;
   std::string failure;         ///< what the diagnosis threw, if it did
 
@@ -81,15 +84,16 @@ struct TrialResult {
   int nulls = 0, false_alarms = 0;    ///< campaigns with nothing hidden, and those of them where something was named
   int wrong_names = 0, misses = 0;    ///< with something hidden: an effect was named that was not there; nothing was named
   Reliability reliability;
+  std::optional<LawCounts> laws;      ///< of a trial of laws
   int failures = 0;                   ///< campaigns that could not be drawn or diagnosed: in none of these counts
   unsigned seed = 0;
   std::vector<std::string> recordings;  ///< files that the simulated runs repeat
   std::string rig_file, rig_fingerprint;          ///< core/rig/fingerprint.h
   std::vector<std::string> recording_fingerprints;
-  double noise = 0;                     ///< of the gauge [N]; of several recordings the largest
+  double noise = 0;                     ///< of the gauge [N]; of several recordings or noises that are drawn the largest
 };
 
-/// Trial i hides nothing (i = 0 and every further round), or the next of `effects`, or it and another one; sizes and rigs are drawn anew from (seed, i), so
+/// Trial i of laws hides the next of them. Else trial i hides nothing (i = 0 and every further round), or the next of `effects`, or it and another one; sizes and rigs are drawn anew from (seed, i), so
 /// that a trial depends on nothing but these two numbers.
 ///
 /// Throws InputError where the rig cannot be plucked and pitched (trial_campaign.h), a recording cannot be repeated (trial_plan.h), or `outside` would leave no candidate.

@@ -26,13 +26,14 @@ int trial_command(int argc, char** argv) {
   std::vector<std::string> ids, recordings;
   app.add_option("--rig", rig, "rig file (TOML)")->required();
   app.add_option("runs", recordings, "recordings (CSV) that the simulated runs repeat: their conditions, motion, release, sampling and noise; without any, two plucks and three steps are drawn");
-  app.add_option("--effects", ids, "effects to hide in turn, and the candidates, separated by commas; without it, all")->delimiter(',')->allow_extra_args(false);
+  CLI::Option* const effects = app.add_option("--effects", ids, "effects to hide in turn, and the candidates, separated by commas; without it, all")->delimiter(',')->allow_extra_args(false);
   app.add_option("--trials", problem.trials, "campaigns; every so many-th hides nothing")->capture_default_str()->check(CLI::Range(1, 1000000));
   CLI::Option* const pairs = app.add_flag("--pairs", problem.pairs, "hide two effects at a time");
   app.add_option("--seed", problem.seed, "of the random numbers")->capture_default_str();
-  app.add_option("--noise", noise, "standard deviation of the gauge's noise; without it that of the recordings, or 0.03 N");
-  app.add_flag("--outside", problem.outside, "keep what is hidden from the candidates: the right verdict is `unexplained`");
-  app.add_flag("--nulls", problem.nulls, "hide nothing in any campaign: every name is a false alarm")->excludes(pairs)->excludes("--outside");
+  app.add_option("--noise", noise, "standard deviation of the gauge's noise; without it that of the recordings, or 0.03 N; with --law drawn from 0.03 to 0.3 N");
+  app.add_flag("--outside", problem.outside, "keep what is hidden from the candidates: the right verdict is `unexplained`; with --law, hide laws that the dictionary cannot say");
+  CLI::Option* const nulls = app.add_flag("--nulls", problem.nulls, "hide nothing in any campaign: every name is a false alarm")->excludes(pairs)->excludes("--outside");
+  app.add_flag("--law", problem.laws, "hide a law in each campaign, in turn those of the dictionary that `diagnose` searches, with parameters drawn; two more runs are held out")->excludes(pairs)->excludes(nulls)->excludes(effects);
   app.add_flag("--ideal", problem.ideal, "white noise, exact files and steady signals. Without it noise may be first-order, pink, heavy-tailed or quantised, in half of the campaigns one kind of number in the files is off, and the phase of vortex shedding walks");
   app.add_option("--shard", shard, "i/n: only every n-th campaign, from the i-th on, for `unrig collect` to put together; without it, what falls to this task of Slurm (SLURM_ARRAY_TASK_ID) or this rank of Open MPI");
   app.add_option("--cases", problem.cases, "folder in which the outcome of each campaign is kept: a second call computes only what is missing");

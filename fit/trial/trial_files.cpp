@@ -12,6 +12,7 @@
 #include "core/rig/fingerprint.h"
 #include "core/files/provenance.h"
 #include "core/files/text_file.h"
+#include "fit/trial/law_files.h"
 #include "fit/trial/parts.h"
 
 namespace unrig {
@@ -27,6 +28,7 @@ ordered_json json_of(const TrialOutcome& o, bool seconds) {
   one["noise"] = o.noise;
   one["misread"] = o.misread.empty() ? ordered_json(nullptr) : ordered_json(o.misread);
   one["probability"] = o.probability ? ordered_json(*o.probability) : ordered_json(nullptr);
+  if (o.law) one["law"] = json_of(*o.law);
   if (seconds) one["seconds"] = o.seconds;
   if (!o.failure.empty()) one["failure"] = o.failure;
   return one;
@@ -46,6 +48,7 @@ TrialOutcome outcome_of(const ordered_json& json) {
   json.at("noise").get_to(o.noise);
   if (const ordered_json& misread = json.at("misread"); !misread.is_null()) misread.get_to(o.misread);
   if (const ordered_json& probability = json.at("probability"); !probability.is_null()) o.probability = probability.get<double>();
+  if (json.contains("law")) o.law = law_outcome_of(json.at("law"));
   o.seconds = json.value("seconds", 0.0);
   o.failure = json.value("failure", std::string());
   return o;
@@ -68,6 +71,7 @@ std::string to_json(const TrialResult& r, const Provenance& made, bool seconds) 
                       {"found_nine_in_ten_from", s.nine_in_ten > 0 ? ordered_json(s.nine_in_ten) : ordered_json(nullptr)}});
   ordered_json json = {{"unrig", "trial"}, {"program", made.program}, {"command", made.command}, {"rig", r.rig_file}, {"rig_fingerprint", r.rig_fingerprint}, {"study", r.study}, {"seed", r.seed}, {"planned", r.trials}, {"noise", {{"gauge", r.noise}, {"unit", "N"}}}, {"recordings", r.recordings}, {"recording_fingerprints", r.recording_fingerprints}, {"nulls", r.nulls}, {"false_alarms", r.false_alarms},
                        {"wrong_names", r.wrong_names}, {"misses", r.misses}, {"confusion", r.confusion}, {"reliability", json_of(r.reliability)}, {"effects", scores}, {"hidden_in_turn", r.effects}, {"trials", trials}};
+  if (r.laws) json["laws"] = json_of(*r.laws);
   if (r.shards > 1) json["shard"] = fmt::format("{}/{}", r.shard, r.shards);
   return json.dump(2) + "\n";
 }
@@ -86,6 +90,7 @@ std::string report(const TrialResult& r) {
     text += fmt::format("[[Stated probability -> share of right names]] calibration error {:.3f}, Brier score {:.3f}\n", r.reliability.calibration_error, r.reliability.brier);
     for (const Reliability::Bin& b : r.reliability.bins) text += fmt::format("    {:.2f} to {:.2f}: stated {:.3f}, right {} of {}\n", b.from, b.to, b.stated, b.right, b.campaigns);
   }
+  if (r.laws) text += report(*r.laws);
   for (const TrialOutcome& o : r.outcomes)
     if (!o.failure.empty()) text += fmt::format("    failed with {} hidden: {}\n", name_of(o.hidden), o.failure);
   return text;
@@ -126,6 +131,7 @@ TrialResult collected(const std::vector<TrialResult>& shards, const std::vector<
   all.confusion.clear();
   all.scores.clear();
   all.reliability = {};
+  all.laws.reset();
   all.nulls = all.false_alarms = all.wrong_names = all.misses = all.failures = 0;
   all.shard = all.shards = 1;
   tally(all);
@@ -138,6 +144,7 @@ std::string study_of(const TrialProblem& problem, const std::vector<std::string>
   parts.insert(parts.end(), effects.begin(), effects.end());
   if (problem.nulls) parts.emplace_back("nulls");
   if (problem.ideal) parts.emplace_back("ideal");
+  if (problem.laws) parts.emplace_back("laws");
   return fingerprint(std::string_view(fmt::format("{}", fmt::join(parts, "\n"))));
 }
 

@@ -92,6 +92,8 @@ def make_results(out):
         unrig("trial", *campaign("null"), "--trials", 3, "--effects", "tank-wave,gauge-lowpass", "--shard", f"{shard}/2", "-o", out / f"trial_{shard}.json")
     unrig("collect", out / "trial_1.json", out / "trial_2.json", "-o", out / "trial.json")
     unrig("trial", *campaign("null", *decays, "step_a.csv"), "--trials", 1, "--effects", "tank-wave", "-o", out / "trial_alike.json")
+    half_a_second = write(out / "half_a_second.csv", "".join((null / "dry_pluck.csv").read_text().splitlines(True)[:257]))
+    unrig("trial", *campaign("null"), half_a_second, "--law", "--ideal", "--noise", "0.1 N", "--seed", 3, "--trials", 1, "-o", out / "trial_law.json")
 
     unrig("apparent-mass", *campaign("null"), "--dry", null / decays[0], "--wet", null / decays[1], "-o", out / "apparent.json")
     modes = write(out / "modes.toml", 'unrig_rig = 1\nname = "one mode"\n[[modal]]\nmass = "7.9 kg"\nfrequency = "6.85 Hz"\ndamping_ratio = 0.01\ngauge_gain = "10000 N/m"\n')
