@@ -69,7 +69,7 @@ def print_laws(results):
     told = [t["law"]["heldout_over_exact"] for t in laws if t["law"]["heldout_over_exact"] is not None]
     named = sorted(t["law"]["rivals"] for t in laws if t["law"]["named"])
     right = sum(of_law(t) in ("right", "among rivals") for t in decided)
-    print(f"{len(trials)} campaigns (seeds {', '.join(str(r['seed']) for r in results)}), {sum('failure' in t for t in trials)} failed\n")
+    print(f"{len(trials)} campaigns (seeds {', '.join(sorted({str(r['seed']) for r in results}))}), {sum('failure' in t for t in trials)} failed\n")
     print(f"- an exact model is ahead by 10 or more in twice the log likelihood: {share(len(decided), len(laws))}; of these right or among the rivals {share(right, len(decided))}")
     print(f"- wrong alone: {share(sum(t['law']['wrong_alone'] for t in laws), len(laws))}; class right: {share(sum(t['law']['class_right'] for t in laws), len(laws))}")
     if named:

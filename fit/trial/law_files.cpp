@@ -19,6 +19,7 @@ ordered_json json_of(const ToldLaw& law) {
   ordered_json json = {{"effect", law.effect}, {"class", law.kind}, {"force", law.force}};
   if (!law.memory.empty()) json["memory"] = law.memory;
   json["parameters"] = std::move(parameters);
+  json["scales"] = law.scales;
   return json;
 }
 
@@ -29,6 +30,7 @@ ToldLaw law_of(const ordered_json& json) {
   json.at("force").get_to(law.force);
   law.memory = json.value("memory", std::string());
   for (const ordered_json& v : json.at("parameters")) law.parameters.push_back({v.at("name").get<std::string>(), v.at("unit").get<std::string>(), v.at("value").get<double>()});
+  json.at("scales").get_to(law.scales);
   return law;
 }
 

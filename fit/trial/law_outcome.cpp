@@ -33,7 +33,7 @@ double power_of(const ToldLaw& a, const ToldLaw& b) {
 
 ToldLaw told(const MissingEffect& m) {
   if (m.law) return told(m.law->law);
-  ToldLaw all{m.effect, m.kind, m.equation, "", {}};
+  ToldLaw all{m.effect, m.kind, m.equation, ""};
   for (const FittedParameter& p : m.parameters) all.parameters.push_back({p.name.substr(p.name.find('.') + 1), p.unit, p.value});
   return all;
 }
@@ -42,7 +42,7 @@ ToldLaw told(const MissingEffect& m) {
 std::optional<ToldLaw> only_one(Strings effects, const std::string& law, bool misread) {
   if (misread) std::erase(effects, rig_description_id);
   if (effects.size() != 1) return std::nullopt;
-  return law.empty() ? ToldLaw{effects.front(), "", "", "", {}} : told(parse_law(law, "a rival"));
+  return law.empty() ? ToldLaw{effects.front(), "", "", ""} : told(parse_law(law, "a rival"));
 }
 
 /// Sets called as good as what is named.
@@ -58,7 +58,7 @@ std::vector<std::optional<ToldLaw>> rivals_of(const Diagnosis& d, bool misread) 
 /// Whether the effect of this id says what was hidden, with the numbers that it has where it is named.
 bool is_hidden(const LawOutcome& o, const std::string& id) {
   const auto named = std::find_if(o.named.begin(), o.named.end(), [&](const ToldLaw& n) { return n.effect == id; });
-  return say_the_same(o.hidden, named == o.named.end() ? ToldLaw{id, "", "", "", {}} : *named);
+  return say_the_same(o.hidden, named == o.named.end() ? ToldLaw{id, "", "", ""} : *named);
 }
 
 void hold_against_truth(LawOutcome& o, const Diagnosis& d) {
@@ -90,8 +90,10 @@ bool within(const LawOutcome& o) {
 }  // namespace
 
 ToldLaw told(const Law& law) {
-  ToldLaw all{law.id(), law.name.starts_with("curve") ? "curve" : law.kind(), law.force_text, law.memory_text, {}};
+  ToldLaw all{law.id(), law.name.starts_with("curve") ? "curve" : law.kind(), law.force_text, law.memory_text};
   for (const Parameter& p : law.parameters) all.parameters.push_back({p.name, p.unit, p.start});
+  for (std::size_t s = 0; s < symbol_count; ++s)
+    if (law.scales[s] != 1) all.scales.emplace(symbol_names[s], law.scales[s]);
   return all;
 }
 

@@ -1,4 +1,5 @@
 #pragma once
+#include <map>
 #include <optional>
 #include <string>
 #include <vector>
@@ -17,7 +18,8 @@ struct ToldLaw {
   std::string effect;         ///< its id
   std::string kind;           ///< class of physics: Effect::kind, of a law without a formula of its own "curve"
   std::string force, memory;  ///< of an effect of the list its equation
-  std::vector<Value> parameters;
+  std::vector<Value> parameters = {};
+  std::map<std::string, double> scales = {};  ///< symbols are divided by these [SI]
 };
 ToldLaw told(const Law& law);
 

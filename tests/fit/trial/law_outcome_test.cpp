@@ -11,7 +11,7 @@ namespace unrig {
 namespace {
 
 Law spring(double power, const std::string& name = "spring with a power") {
-  return parse_law("unrig_law = 1\nname = \"" + name + "\"\nacts_on = \"normal\"\nforce = \"-c * abs(x)^p * sign(x)\"\n[parameters]\nc = { start = \"1 N\" }\np = { start = " + std::to_string(power) + ", lower = 0.1 }\n", "spring");
+  return parse_law("unrig_law = 1\nname = \"" + name + "\"\nacts_on = \"normal\"\nforce = \"-c * abs(x)^p * sign(x)\"\n[parameters]\nc = { start = \"1 N\" }\np = { start = " + std::to_string(power) + ", lower = 0.1 }\n[scales]\nx = \"2 mm\"\n", "spring");
 }
 
 MissingEffect missing(const std::string& effect, const std::string& kind) {
@@ -38,6 +38,7 @@ TEST(LawOutcome, TheSameFormIsRight) {
   EXPECT_FALSE(o.among_rivals);
   EXPECT_FALSE(o.wrong_alone());
   EXPECT_EQ(o.hidden.parameters[1].value, 2.5);
+  EXPECT_EQ(o.hidden.scales, (std::map<std::string, double>{{"x", 0.002}}));
   EXPECT_EQ(o.named.front().parameters[1].value, 2.6);
 }
 
@@ -87,7 +88,7 @@ TEST(LawOutcome, HoldsSetsAndHeldOutRunsAgainstTheExactModel) {
 
 LawOutcome made_up(bool named, bool right, bool rival, std::size_t rivals, double ahead, double heldout) {
   LawOutcome o;
-  if (named) o.named = {{"law:x", "stiffness", "", "", {}}};
+  if (named) o.named = {{"law:x", "stiffness", "", ""}};
   o.equation_right = right;
   o.among_rivals = rival;
   o.rivals = rivals;
