@@ -188,12 +188,12 @@ MatrixXd symbols_of(const Run& run, RowVectorXd& rest) {
 
 }  // namespace
 
-Reached reached_by(const Rig& rig, const std::vector<PlannedRun>& runs) {
+Reached reached_by(const Rig& rig, const std::vector<PlannedRun>& runs, const std::optional<VectorXd>& truth) {
   const AeroelasticModel model = whole_model(with_sensors_of_laws(rig), runs);
   Reached reached;
   Reach& reach = reached.reach;
   for (const PlannedRun& planned : runs) {
-    const Run run = simulate(problem_of(model, model.start_values(), planned)).run;
+    const Run run = simulate(problem_of(model, truth ? *truth : model.start_values(), planned)).run;
     reached.symbols.push_back(symbols_of(run, reached.rest.emplace_back()));
     reached.dt = std::max(reached.dt, run.dt);
     const auto most = [&](Symbol s) { return reached.symbols.back().col(static_cast<Index>(at(s))).cwiseAbs().maxCoeff(); };

@@ -1,5 +1,6 @@
 #pragma once
 #include <Eigen/Core>
+#include <optional>
 #include <random>
 #include <string>
 #include <vector>
@@ -11,7 +12,7 @@
 
 namespace unrig {
 
-/// Where the runs of a plan take the rig as its file has it, with no law at work.
+/// Where the runs of a plan take the rig with no law at work.
 struct Reached {
   Reach reach;                            ///< largest absolute values
   std::vector<Eigen::MatrixXd> symbols;   ///< per run: samples x symbols, in SI; z is 0
@@ -20,7 +21,8 @@ struct Reached {
   Eigen::Index strips = 0;
 };
 /// x, v and a of all modes together, where a law takes the first; alpha without what the rig moves by. The laws in which that matters are drawn by a size that is off by as much.
-Reached reached_by(const Rig& rig, const std::vector<PlannedRun>& runs);
+/// `truth`: parameters of the rig (draw_rig); none: as its file has it.
+Reached reached_by(const Rig& rig, const std::vector<PlannedRun>& runs, const std::optional<Eigen::VectorXd>& truth = {});
 
 /// What a trial hides in turn: the dictionary that a diagnosis searches, or laws that no line of it can say (`outside`); of both those whose symbols these runs move. Parameters stand at no values yet.
 std::vector<Law> laws_to_hide(const Rig& rig, const Reached& reached, bool outside);

@@ -88,13 +88,15 @@ struct LawPlan {
   Rig rig;
   std::vector<PlannedRun> runs;
   std::size_t heldout = 0;
+  Eigen::VectorXd truth;  // of the rig
 };
 
 LawPlan plan_law(const TrialProblem& problem, std::size_t trial, std::mt19937_64& random) {
   LawPlan planned;
   const std::optional<double> noise = draw_noise_level(problem, random);
   planned.runs = plan(problem, noise, random);
-  const Reached reached = reached_by(problem.rig, planned.runs);
+  planned.truth = draw_rig(whole_model(problem.rig, planned.runs), random);
+  const Reached reached = reached_by(problem.rig, planned.runs, planned.truth);
   const std::vector<Law> forms = laws_to_hide(problem.rig, reached, problem.outside);
   planned.law = draw_law(forms[trial % forms.size()], reached, random);
   planned.rig = problem.rig;
@@ -105,11 +107,11 @@ LawPlan plan_law(const TrialProblem& problem, std::size_t trial, std::mt19937_64
   return planned;
 }
 
-TrialCampaign draw(const TrialProblem& problem, const Rig& rig, const std::vector<PlannedRun>& planned, std::mt19937_64& random, TrialOutcome& outcome) {
+TrialCampaign draw(const TrialProblem& problem, const Rig& rig, const std::vector<PlannedRun>& planned, const std::optional<Eigen::VectorXd>& truth, std::mt19937_64& random, TrialOutcome& outcome) {
   const Laboratory laboratory = problem.ideal ? ideal_laboratory() : draw_laboratory(problem.rig, recorded_runs(planned), random);
   outcome.noise = to_string(laboratory.noise);
   outcome.misread = laboratory.misread;
-  TrialCampaign campaign = draw_campaign(rig, outcome.hidden, planned, laboratory, random);
+  TrialCampaign campaign = draw_campaign(rig, outcome.hidden, planned, laboratory, random, truth);
   outcome.parameters = campaign.parameters;
   outcome.size = campaign.size;
   outcome.sizes = campaign.sizes;
@@ -127,7 +129,7 @@ void take_verdict(const Diagnosis& d, TrialOutcome& outcome) {
 }
 
 void try_effects(const TrialProblem& problem, const Strings& effects, std::mt19937_64& random, TrialOutcome& outcome) {
-  const TrialCampaign campaign = draw(problem, problem.rig, plan(problem, problem.noise, random), random, outcome);
+  const TrialCampaign campaign = draw(problem, problem.rig, plan(problem, problem.noise, random), {}, random, outcome);
   DiagnoseProblem diagnosis;
   diagnosis.rig = campaign.rig;
   diagnosis.runs = campaign.runs;
@@ -140,7 +142,7 @@ void try_effects(const TrialProblem& problem, const Strings& effects, std::mt199
 void try_law(const TrialProblem& problem, std::mt19937_64& random, TrialOutcome& outcome) {
   const LawPlan planned = plan_law(problem, outcome.trial, random);
   outcome.hidden = {planned.law.id()};
-  const TrialCampaign campaign = draw(problem, planned.rig, planned.runs, random, outcome);
+  const TrialCampaign campaign = draw(problem, planned.rig, planned.runs, planned.truth, random, outcome);
   const auto first_heldout = campaign.runs.end() - static_cast<std::ptrdiff_t>(planned.heldout);
   DiagnoseProblem diagnosis;
   diagnosis.rig = campaign.rig;

@@ -28,17 +28,6 @@ VectorXd draw_parameters(const Effect& e, const AeroelasticModel& model, double 
   return p;
 }
 
-VectorXd draw_rig(const AeroelasticModel& model, Random& random) {
-  VectorXd theta = model.start_values();
-  const auto set = [&](const char* name, double low, double high) { theta[model.index(name)] = log_between(random, low, high); };
-  set("normal.stiffness_scale", 0.7, 1.1);
-  set("torsion.stiffness_scale", 0.7, 1.1);
-  set("normal.damping_ratio", 0.005, 0.015);
-  set("torsion.damping_ratio", 0.01, 0.03);
-  set("apparent_mass_coefficient", 0.9, 1.2);
-  return theta;
-}
-
 double rms(const VectorXd& x) { return std::sqrt(x.squaredNorm() / static_cast<double>(x.size())); }
 
 /// Columns that a diagnosis is given: the angle, the gauge, and every sensor.
@@ -169,6 +158,17 @@ AeroelasticModel whole_model(const Rig& rig, const std::vector<PlannedRun>& runs
   return {rig, make_basis(rig, nyquist, density), wagner(Wagner::within_1e6)};
 }
 
+VectorXd draw_rig(const AeroelasticModel& model, Random& random) {
+  VectorXd theta = model.start_values();
+  const auto set = [&](const char* name, double low, double high) { theta[model.index(name)] = log_between(random, low, high); };
+  set("normal.stiffness_scale", 0.7, 1.1);
+  set("torsion.stiffness_scale", 0.7, 1.1);
+  set("normal.damping_ratio", 0.005, 0.015);
+  set("torsion.damping_ratio", 0.01, 0.03);
+  set("apparent_mass_coefficient", 0.9, 1.2);
+  return theta;
+}
+
 SimulateProblem problem_of(const AeroelasticModel& model, const VectorXd& theta, const PlannedRun& planned) {
   SimulateProblem problem{model, theta, planned.fine, {}, {}, {}};
   problem.theta[model.index("normal_force_slope")] = planned.slope;
@@ -182,7 +182,7 @@ void check_for_trials(const Rig& rig) {
     throw InputError({rig.file, 0}, "the rig cannot be plucked and pitched", "wanted a beam rig with a gauge, a calibration element and a submerged section", "");
 }
 
-TrialCampaign draw_campaign(const Rig& rig, const Strings& hidden, const std::vector<PlannedRun>& runs, const Laboratory& laboratory, Random& random) {
+TrialCampaign draw_campaign(const Rig& rig, const Strings& hidden, const std::vector<PlannedRun>& runs, const Laboratory& laboratory, Random& random, const std::optional<VectorXd>& truth) {
   check_for_trials(rig);
   TrialCampaign campaign;
   campaign.hidden = hidden;
@@ -195,7 +195,7 @@ TrialCampaign draw_campaign(const Rig& rig, const Strings& hidden, const std::ve
   const bool modes_hidden = std::any_of(hidden.begin(), hidden.end(), [&](const std::string& id) { return effect(rig, id).enriches_basis; });
   if (modes_hidden) campaign.rig.normal.modes = 1;
 
-  const VectorXd rig_theta = draw_rig(bare, random);
+  const VectorXd rig_theta = truth ? *truth : draw_rig(bare, random);
   VectorXd theta = model.start_values();
   theta.head(rig_theta.size()) = rig_theta;
   for (const std::string& id : hidden) {

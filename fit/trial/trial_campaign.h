@@ -1,6 +1,7 @@
 #pragma once
 #include <Eigen/Core>
 #include <map>
+#include <optional>
 #include <random>
 #include <string>
 #include <vector>
@@ -27,11 +28,15 @@ struct TrialCampaign {
 /// Simulates these runs with the effects at work, those of the table and laws of the rig. Stiffness, damping and apparent mass are drawn around the rig file's, the effects' sizes as each
 /// of them says (Effect::draw), or where they start; the laboratory adds its noise, misread numbers and walking phases. Sensors of the rig are recorded too, with a noise as small beside their reading as the gauge's. The truth has every normal mode, circulation within 1e-6 and a quarter of the recorded step. `rig` has all its modes, unless `higher-mode` is hidden: then it has one.
 ///
+/// `truth`: parameters of the rig that were drawn already.
+///
 /// Throws InputError where the rig has no section, gauge or calibration element.
-TrialCampaign draw_campaign(const Rig& rig, const std::vector<std::string>& hidden, const std::vector<PlannedRun>& runs, const Laboratory& laboratory, std::mt19937_64& random);
+TrialCampaign draw_campaign(const Rig& rig, const std::vector<std::string>& hidden, const std::vector<PlannedRun>& runs, const Laboratory& laboratory, std::mt19937_64& random, const std::optional<Eigen::VectorXd>& truth = {});
 
 /// Every mode that half the simulated sampling rate lets through, in the densest fluid, circulation within 1e-6.
 AeroelasticModel whole_model(const Rig& rig, const std::vector<PlannedRun>& runs);
+/// Parameters of such a model, drawn around the rig file's.
+Eigen::VectorXd draw_rig(const AeroelasticModel& model, std::mt19937_64& random);
 /// What drives the same rig in one run, with and without what is hidden.
 SimulateProblem problem_of(const AeroelasticModel& model, const Eigen::VectorXd& theta, const PlannedRun& planned);
 

@@ -125,6 +125,16 @@ TEST(HiddenLaw, IsOneThatTheRunsMove) {
   EXPECT_TRUE(symbols({some_runs().front()}).empty()) << "a pluck at rest, in still water";
 }
 
+/// A load that releases a softer rig takes it farther: by so much more the gap of a law that closes must be.
+TEST(HiddenLaw, IsPutToTheRigAsItIs) {
+  const Rig rig = read_rig(test::null_campaign("rig.toml"));
+  const std::vector<PlannedRun> runs{some_runs().front()};
+  const AeroelasticModel model = whole_model(rig, runs);
+  Eigen::VectorXd soft = model.start_values();
+  soft[model.index("normal.stiffness_scale")] = 0.7;
+  EXPECT_NEAR(reached_by(rig, runs, soft).reach.x / reached_by(rig, runs).reach.x, 1 / 0.7, 0.02) << "modes are those of the rig file";
+}
+
 TEST(HiddenLaw, OutsideTheDictionaryNoLineHasItsName) {
   const Rig rig = read_rig(test::null_campaign("rig.toml"));
   const Reached reached = reached_by(rig, some_runs());
