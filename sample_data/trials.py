@@ -11,6 +11,7 @@ Of `unrig trial --law`: right is the hidden law by itself, or the same under ano
 import collections
 import json
 import pathlib
+import statistics
 import sys
 
 VISIBLE = 3  # sizes from here on count
@@ -61,29 +62,36 @@ def of_law(trial):
     return "unexplained" if law["unexplained"] else "nothing seen"
 
 
+def well_held(trial):
+    """Whether a run held out is left with at most 1.2 times what an exact model leaves."""
+    ratio = trial["law"]["heldout_over_exact"]
+    return ratio is not None and ratio <= 1.2
+
+
 def print_laws(results):
     """The table of `unrig trial --law`."""
     trials = [t for r in results for t in r["trials"]]
     laws = [t for t in trials if "law" in t]
+    inside, outside = [t for t in laws if not t["law"]["outside"]], [t for t in laws if t["law"]["outside"]]
     decided = [t for t in laws if (t["law"]["exact_ahead"] or 0) >= 10]
-    told = [t["law"]["heldout_over_exact"] for t in laws if t["law"]["heldout_over_exact"] is not None]
-    named = sorted(t["law"]["rivals"] for t in laws if t["law"]["named"])
-    right = sum(of_law(t) in ("right", "among rivals") for t in decided)
+    named = sorted(t["law"]["rivals"] for t in inside if t["law"]["named"])
     print(f"{len(trials)} campaigns (seeds {', '.join(sorted({str(r['seed']) for r in results}))}), {sum('failure' in t for t in trials)} failed\n")
-    print(f"- an exact model is ahead by 10 or more in twice the log likelihood: {share(len(decided), len(laws))}; of these right or among the rivals {share(right, len(decided))}")
-    print(f"- wrong alone: {share(sum(t['law']['wrong_alone'] for t in laws), len(laws))}; class right: {share(sum(t['law']['class_right'] for t in laws), len(laws))}")
+    if inside:
+        clear = [t for t in decided if t in inside]
+        print(f"- of the dictionary, an exact model ahead by 10 or more in twice the log likelihood: {share(len(clear), len(inside))}; of these right or among the rivals {share(sum(of_law(t) in ('right', 'among rivals') for t in clear), len(clear))}")
+        print(f"- wrong alone: {share(sum(t['law']['wrong_alone'] for t in inside), len(inside))}; class right: {share(sum(t['law']['class_right'] for t in inside), len(inside))}; held out at most 1.2 times: {share(sum(map(well_held, inside)), len(inside))}")
     if named:
-        print(f"- rivals where something is named: {named[len(named) // 2]} in the median, {named[-1]} at most")
-    print(f"- runs held out at most 1.2 times what the exact model leaves: {share(sum(ratio <= 1.2 for ratio in told), len(told))}")
+        print(f"- rivals where something is named: {statistics.median(named):g} in the median, {named[-1]} at most")
+    if outside:
+        print(f"- outside the dictionary, a curve or unexplained: {share(sum(of_law(t) in ('curve', 'unexplained') for t in outside), len(outside))}; held out at most 1.2 times: {share(sum(map(well_held, outside)), len(outside))}; both: {share(sum(of_law(t) in ('curve', 'unexplained') and well_held(t) for t in outside), len(outside))}")
     seconds = sorted(t["seconds"] for t in trials if "seconds" in t)
     if seconds:
         print(f"- a diagnosis took {seconds[len(seconds) // 2]:.0f} s in the median, {seconds[-1]:.0f} s at most")
     columns = ["right", "among rivals", "curve", "in company", "wrong alone", "unexplained", "nothing seen"]
-    for outside in (False, True):
-        own = [t for t in laws if t["law"]["outside"] == outside]
+    for what, own in (("of the dictionary", inside), ("outside the dictionary", outside)):
         if not own:
             continue
-        print(f"\n| {'outside the dictionary' if outside else 'of the dictionary'} | campaigns | ahead by 10 | " + " | ".join(columns) + " | named | exact ahead | held out |\n" + "| --- " * (len(columns) + 6) + "|")
+        print(f"\n| {what} | campaigns | ahead by 10 | " + " | ".join(columns) + " | named | exact ahead | held out |\n" + "| --- " * (len(columns) + 6) + "|")
         for name in sorted({t["hidden"][0] for t in own}):
             row = [t for t in own if t["hidden"] == [name]]
             count = collections.Counter(of_law(t) for t in row)

@@ -97,6 +97,10 @@ ToldLaw told(const Law& law) {
   return all;
 }
 
+bool LawOutcome::curve() const {
+  return !named.empty() && std::all_of(named.begin(), named.end(), [](const ToldLaw& law) { return law.kind == "curve"; });
+}
+
 bool say_the_same(const ToldLaw& a, const ToldLaw& b) {
   if (a.effect == b.effect) return true;
   return std::any_of(other_names.begin(), other_names.end(), [&](const OtherName& n) {

@@ -42,7 +42,7 @@ struct LawOutcome {
 
   bool right() const { return equation_right || among_rivals; }
   bool wrong_alone() const { return !named.empty() && !right(); }
-  bool curve() const { return !named.empty() && named.front().kind == "curve"; }
+  bool curve() const;  ///< nothing but curves is named
 };
 
 /// Whether both say the same: one form, or one and its other name ("spring with a power" with p = 3 within a tenth and cubic-stiffness). The linear part of a law is the rig's stiffness and damping, and counts for nothing.

@@ -68,6 +68,8 @@ TEST(LawOutcome, ARivalIsNoWrongNameAloneAndCompanyIsNotRight) {
   const LawOutcome company = judged(spring(2.5), false, 0.1, false, d);
   EXPECT_TRUE(company.wrong_alone());
   EXPECT_TRUE(company.in_company);
+  d.missing.front() = missing(spring(2, "curve of the displacement"));
+  EXPECT_FALSE(judged(spring(2.5), false, 0.1, false, d).curve()) << "and a wave";
   d.missing = {missing(spring(2.5)), missing(rig_description_id, "")};
   EXPECT_FALSE(judged(spring(2.5), false, 0.1, false, d).equation_right);
   EXPECT_TRUE(judged(spring(2.5), false, 0.1, true, d).equation_right) << "files are off";
