@@ -118,7 +118,7 @@ std::string head(RunKind kind, const Rig& rig) {
       "# # Lines that begin with \"# # ?\" ask what only you know. The rows are an example: a simulation of the rig \"" + rig.name + "\" with noise. Put yours in their place.\n"
       "# # ? What do reports call the run?\n";
   text += fmt::format("# name = \"{} example\"\n", to_string(kind));
-  text += "# # ? step: the shaft turns, from rest. pluck: a free decay, from its release on. forced: a measured force drives the rig. moved: the mount itself moves.\n";
+  text += "# # ? step: the shaft turns, from rest. pluck: a free decay. forced: a measured force drives the rig. moved: the mount itself moves.\n";
   text += fmt::format("# kind = \"{}\"\n", to_string(kind));
   text +=
       "# # ? Which fluid, how dense, how fast? The density is what counts: water 998 kg/m^3, air 1.2 kg/m^3. A still tank: \"0 m/s\".\n"
@@ -128,7 +128,7 @@ std::string head(RunKind kind, const Rig& rig) {
       "# # speed_std_percent = 0.5 would say how well it is known: one standard deviation. density_std_percent likewise.\n"
       "# # ? Is the gauge in newtons, as an equivalent normal force where the dead weights hung? In volts: write [V] in the row of names, and here calibration = \"4.4 N/V\".\n";
   if (kind == RunKind::step) text += "# # alpha: measured angle of attack, nose up. Let the rig rest before the motion and behind it.\n";
-  if (kind == RunKind::pluck) text += "# # The first row is the release or later; nothing before it.\n";
+  if (kind == RunKind::pluck) text += "# # The first row is the release or later, or a hold still before it: a constant reading for twelve samples or more.\n";
   if (kind == RunKind::forced) text += "# # force: the hammer's, positive like the normal force. In volts: force_calibration = \"22 N/V\".\n";
   if (kind == RunKind::moved) text += "# # mount_acceleration (or mount_velocity): of the mount, along the normal force.\n";
   for (const Sensor& sensor : rig.sensors) text += fmt::format("# # {}: the column of the rig file's [[sensor]].\n", sensor.column);

@@ -15,6 +15,7 @@
 #include "core/run/bad_readings.h"
 #include "core/run/column_names.h"
 #include "core/files/csv_table.h"
+#include "core/run/release.h"
 #include "core/run/run_limits.h"
 #include "core/rig/stated_errors.h"
 #include "core/files/text_file.h"
@@ -443,6 +444,7 @@ Run parse_run(std::string_view text, const std::string& path) {
   take_columns(table, calibrations, run);
   warn_of_idle_calibration(calibrations.gauge, "gauge", run);
   warn_of_idle_calibration(calibrations.force, "force", run);
+  begin_at_release(run);
   return run;
 }
 

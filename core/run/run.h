@@ -2,6 +2,7 @@
 #include <Eigen/Core>
 #include <cstddef>
 #include <memory>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -31,6 +32,12 @@ struct Channel {
   std::size_t bad = 0;      ///< isolated readings far from their neighbours, left out
 };
 
+/// What a pluck was held for before its release, and is left out (core/run/release.h).
+struct Hold {
+  Eigen::Index samples = 0;  ///< before the first that is left
+  double release = 0;        ///< s, the likeliest instant
+};
+
 /// One recording: the file's meta data and its columns on a uniform grid t_k = start + k dt.
 ///
 /// Columns with a meaning (`alpha`, `gauge`, `force`, `mount_velocity`, `mount_acceleration`, `weight`) are in SI. So are others, which a
@@ -47,6 +54,7 @@ struct Run {
   double dt = 0;              ///< s
   bool resampled = false;     ///< true where the file's times jitter and the channels were interpolated to the uniform grid
   double largest_jitter = 0;  ///< s
+  std::optional<Hold> hold;   ///< of a pluck that was held when its record began
   std::vector<Channel> channels;
   std::shared_ptr<const Givens> givens;  ///< stated uncertainties of the header's numbers; none: all are exact
   std::vector<std::string> warnings;
@@ -66,6 +74,8 @@ struct Run {
 ///
 /// A `gauge` or `force` column in volts or counts is scaled by the meta data's `calibration` or `force_calibration`; without one it stays
 /// in volts or counts, with a warning. An unknown column that holds text is left out, with a warning.
+///
+/// A pluck that begins with a hold is left from its release on (core/run/release.h); `hold` says so.
 ///
 /// Throws InputError for everything that cannot be used: missing or unknown magic, unknown keys, units, header without units, ragged or
 /// truncated rows, decreasing or missing time, text or infinity in a column with a meaning, such a column without a single number, a

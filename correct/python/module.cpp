@@ -26,6 +26,7 @@
 #include "core/rig/fingerprint.h"
 #include "core/numerics/in_parallel.h"
 #include "core/rig/rig.h"
+#include "core/run/release.h"
 #include "core/run/run.h"
 #include "core/files/units.h"
 #include "correct/correct.h"
@@ -204,6 +205,7 @@ Run run_of_arrays(const std::string& name, const std::string& kind, const Eigen:
     channel.value = channel.value.array().isFinite().select(channel.value, std::nan(""));
     run.channels.push_back(std::move(channel));
   }
+  begin_at_release(run);
   return run;
 }
 
