@@ -2,6 +2,7 @@
 #include <Eigen/Core>
 #include <functional>
 #include <map>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -61,6 +62,7 @@ struct FittedRun {
   std::string fingerprint;  ///< of its readings (core/rig/fingerprint.h)
   double onset_angle = 0;  ///< rad (RunConditions)
   Eigen::Index samples = 0;
+  std::optional<Hold> hold;  ///< before the release of a pluck, left out
   double chi2 = 0;
   Eigen::Index degrees_of_freedom = 0;
   std::vector<FittedChannel> channels;  ///< the fitted outputs, then `alpha` where the motion was estimated

@@ -111,6 +111,7 @@ FittedRun describe_run(const RunResidual& residual, const VectorXd& theta, doubl
   fitted.fingerprint = fingerprint(run, residual.model().rig());
   fitted.onset_angle = residual.conditions().onset_angle;
   fitted.samples = run.samples();
+  fitted.hold = run.hold;
   fitted.chi2 = chi2;
   fitted.degrees_of_freedom = residual.degrees_of_freedom();
   fitted.in_stream = run.speed > 0;

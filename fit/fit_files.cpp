@@ -243,6 +243,7 @@ std::string to_json(const FitResult& r, const std::vector<std::shared_ptr<const 
     out["runs"].push_back({{"file", run.file}, {"fingerprint", run.fingerprint}, {"onset_angle", number(run.onset_angle)}, {"in_stream", run.in_stream}, {"samples", run.samples}, {"rms_residual", number(first.rms_residual)}, {"noise", number(first.noise)},
                            {"unit", first.unit}, {"reduced_chi2", number(run.reduced_chi2())}, {"whiteness", number(run.whiteness)}, {"explained", run.explained()},
                            {"followed", number(run.followed)}, {"set_aside", run.aside}, {"channels", channels}});
+    if (run.hold) out["runs"].back()["release"] = run.hold->release, out["runs"].back()["held"] = run.hold->samples;
   }
   out["warnings"] = r.warnings;
   return out.dump(2) + "\n";

@@ -9,6 +9,7 @@
 
 #include "core/files/text_file.h"
 #include "core/law/learnt_range.h"
+#include "core/run/release.h"
 
 namespace unrig {
 namespace {
@@ -95,7 +96,8 @@ std::string report(const FitResult& r, double least) {
 
   text += "[[Runs]]\n";
   for (const FittedRun& run : r.runs) {
-    text += fmt::format("    {}: {} samples, reduced chi-square {:.3f}{}\n", base_name(run.file), run.samples, run.reduced_chi2(), run.aside ? ", set aside: no part in the fit" : "");
+    text += fmt::format("    {}: {} samples, reduced chi-square {:.3f}{}{}\n", base_name(run.file), run.samples, run.reduced_chi2(), run.aside ? ", set aside: no part in the fit" : "",
+                        run.hold ? ", " + said_of(*run.hold) : "");
     for (const FittedChannel& c : run.channels)
       text += fmt::format("        {:<6} residual {:.4g} {}, noise {:.4g} {}{}{}\n", c.name, c.rms_residual, c.unit, c.noise, c.unit,
                           c.missing ? fmt::format(", {} missing", c.missing) : "", left_out(c));

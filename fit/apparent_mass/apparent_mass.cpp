@@ -48,6 +48,7 @@ RunModes measure(const Run& run, const Rig& rig, const std::vector<std::string>&
   modes.fingerprint = fingerprint(run, rig);
   modes.medium = run.medium;
   modes.density = run.density;
+  modes.hold = run.hold;
   modes.channels = channels;
   for (const std::string& channel : channels) modes.units.push_back(run.channel(channel).unit);
   modes.noise = found.noise;

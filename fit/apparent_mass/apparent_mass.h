@@ -39,6 +39,7 @@ struct RunModes {
   std::string file, fingerprint;  ///< of its readings (core/rig/fingerprint.h)
   std::string medium;
   double density = 0;  ///< kg/m^3
+  std::optional<Hold> hold;  ///< before the release, left out
   std::vector<ModeLine> modes;  ///< ascending in frequency
   std::size_t fundamental = 0;  ///< which of them is the lowest mode of the rig
   std::vector<std::string> channels, units;

@@ -7,6 +7,7 @@
 #include <nlohmann/json.hpp>
 
 #include "core/files/text_file.h"
+#include "core/run/release.h"
 
 namespace unrig {
 namespace {
@@ -55,6 +56,7 @@ json run_json(const RunModes& run) {
               {"unit", "Hz"},
               {"modes", json::array()},
               {"channels", json::array()}};
+  if (run.hold) out["release"] = run.hold->release, out["held"] = run.hold->samples;
   for (const ModeLine& line : run.modes) out["modes"].push_back(mode_json(line));
   for (std::size_t c = 0; c < run.channels.size(); ++c) {
     const auto i = static_cast<Eigen::Index>(c);
@@ -74,7 +76,7 @@ std::string with_error(const Estimate& e) {
 }
 
 std::string table(const RunModes& run) {
-  std::string text = fmt::format("[[Vibrations in {}]] ({}, {:g} kg/m^3)\n", base_name(run.file), run.medium, run.density);
+  std::string text = fmt::format("[[Vibrations in {}]] ({}, {:g} kg/m^3){}\n", base_name(run.file), run.medium, run.density, run.hold ? " " + said_of(*run.hold) : "");
   text += fmt::format("    {:>24}  {:>22}  {:>12}  {:>4}  {:>12}  {:>10}\n", "frequency [Hz]", "damping ratio [%]", fmt::format("amplitude [{}]", run.units.front()), "mode", "model [Hz]", "off [%]");
   for (const ModeLine& line : run.modes) {
     const DampedMode& m = line.measured;

@@ -8,6 +8,7 @@
 #include <nlohmann/json.hpp>
 
 #include "core/files/text_file.h"
+#include "core/run/release.h"
 
 namespace unrig {
 namespace {
@@ -48,6 +49,7 @@ ordered_json json_of(const RunSummary& run) {
   for (const ChannelSummary& channel : run.channels) channels.push_back(json_of(channel));
   ordered_json json{{"file", run.file}, {"kind", run.kind}, {"medium", run.medium}, {"density", quantity(run.density, "kg/m^3")}, {"speed", quantity(run.speed, "m/s")}, {"samples", run.samples},
                     {"rate", quantity(run.rate, "Hz")}, {"duration", quantity(run.duration, "s")}, {"resampled", run.resampled}};
+  if (run.hold) json["release"] = quantity(run.hold->release, "s"), json["held"] = run.hold->samples;
   json["ringing"] = run.ringing > 0 ? quantity(run.ringing, "Hz") : ordered_json(nullptr);
   json["motion"] = run.moves ? ordered_json{{"begin", quantity(run.motion_begin, "s")}, {"end", quantity(run.motion_end, "s")}, {"onset", quantity(run.onset / degree, "deg")}, {"step", quantity(run.step / degree, "deg")}}
                              : ordered_json(nullptr);
@@ -83,6 +85,7 @@ std::string report(const RigSummary& rig) {
 std::string report(const RunSummary& run) {
   std::string text = fmt::format("{}: {} in {}, {} samples at {:.5g} Hz, {:.4g} s{}\n", run.file, run.kind, run.medium.empty() ? "a fluid" : run.medium, run.samples, run.rate, run.duration, run.resampled ? ", resampled" : "");
   if (run.moves) text += fmt::format("    rests until {:.4g} s, moves until {:.4g} s, from {:.4g} deg by {:.4g} deg\n", run.motion_begin, run.motion_end, run.onset / degree, run.step / degree);
+  if (run.hold) text += "    " + said_of(*run.hold) + "\n";
   if (run.ringing > 0) text += fmt::format("    rings at {:.4g} Hz\n", run.ringing);
   text += fmt::format("    {:<14} {:>6} {:>12} {:>12} {:>12} {:>10} {:>8}\n", "channel", "unit", "minimum", "maximum", "mean", "noise", "white");
   for (const ChannelSummary& channel : run.channels) text += channel_line(channel);

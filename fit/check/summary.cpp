@@ -128,6 +128,7 @@ RunSummary summary_of(const Rig& rig, const Run& run) {
   summary.rate = 1 / run.dt;
   summary.duration = run.dt * static_cast<double>(run.samples());
   summary.resampled = run.resampled;
+  summary.hold = run.hold;
   const CheckModel check(rig);
   const RunEstimate estimated = estimate(check, run);
   summary.ringing = estimated.line;

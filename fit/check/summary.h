@@ -56,6 +56,7 @@ struct RunSummary {
   bool moves = false;
   double motion_begin = 0, motion_end = 0;  ///< s
   double onset = 0, step = 0;               ///< rad
+  std::optional<Hold> hold;                 ///< before the release of a pluck, left out
   double ringing = 0;                       ///< Hz, the line that stands for the lowest mode; 0: none
   std::vector<ChannelSummary> channels;
 };

@@ -12,7 +12,9 @@
 #include "core/rig/given_files.h"
 #include "core/numerics/in_parallel.h"
 #include "core/files/provenance.h"
+#include "core/files/text_file.h"
 #include "core/files/together.h"
+#include "core/run/release.h"
 #include "fit/diagnose/diagnose.h"
 #include "fit/diagnose/diagnosis_files.h"
 #include "fit/effect_option.h"
@@ -93,6 +95,8 @@ int diagnose_command(int argc, char** argv) {
   const std::string told = to_json(diagnosis), fitted = fit_output.empty() ? std::string() : to_json(diagnosis.after, diagnosis.laws);
   write_together({{output, whole(told)}, {fit_output, whole(fitted)}});
   fmt::print("{}", report(diagnosis));
+  for (const Run& run : all)
+    if (run.hold) fmt::print("    {}: {}\n", base_name(run.file), said_of(*run.hold));
   fmt::print("    {:.1f} s\n", diagnosis.seconds);
   return diagnosis.unexplained ? exit_no_answer : exit_done;
 }
