@@ -55,6 +55,16 @@ def damped_decay(path, x, hertz=7, dt=0.004, samples=900, finer=40):
     return write(path, "\n".join(lines) + "\n")
 
 
+def held_pluck(path, decay, held=200, step=0.002):
+    """A decay of the samples behind the hold before its release."""
+    noise, lines = random.Random(1), decay.read_text().splitlines()
+    first = next(i for i, line in enumerate(lines) if not line.startswith("#")) + 1
+    level = lines[first].split(",")[2]
+    hold = [f"{step * k:.3f},0,{float(level) + noise.gauss(0, 0.03):.5f}" for k in range(held)]
+    behind = [f"{float(time) + step * held:.3f},{rest}" for time, rest in (line.split(",", 1) for line in lines[first:])]
+    return write(path, "\n".join([*lines[:first], *hold, *behind]) + "\n")
+
+
 def make_results(out):
     """All kinds of results, into the folder `out`."""
     decays, steps = ("dry_pluck.csv", "wet_pluck.csv"), ("step_a.csv", "step_b.csv")
@@ -98,6 +108,11 @@ def make_results(out):
     unrig("apparent-mass", *campaign("null"), "--dry", null / decays[0], "--wet", null / decays[1], "-o", out / "apparent.json")
     modes = write(out / "modes.toml", 'unrig_rig = 1\nname = "one mode"\n[[modal]]\nmass = "7.9 kg"\nfrequency = "6.85 Hz"\ndamping_ratio = 0.01\ngauge_gain = "10000 N/m"\n')
     unrig("apparent-mass", "--rig", modes, "--dry", null / decays[0], "--wet", null / decays[1], "-o", out / "apparent_modes.json", status=(0, 1))
+
+    held = held_pluck(out / "held.csv", null / decays[0])
+    unrig("fit", *campaign("null"), held, "-o", out / "fit_held.json")
+    unrig("apparent-mass", *campaign("null"), "--dry", held, "--wet", null / decays[1], "-o", out / "apparent_held.json")
+    unrig("check", *campaign("null"), held, "-o", out / "check_held.json")
 
     unrig("check", *campaign("null"), "-o", out / "check_rig.json")
     unrig("check", *campaign("null", "dry_pluck.csv", "step_a.csv"), "-o", out / "check.json")

@@ -195,9 +195,9 @@ TEST(ClippedReadings, NoneInARestAtTheLargestReading) {
 
 // ---------------------------------------------------------------------------------------------------------------- of a run file
 
-/// The run with its gauge from `gauge`, as text.
+/// The run with its gauge from `gauge`, as text; no pluck, whose rest would be a hold (core/run/release.h).
 std::string run_text(const VectorXd& gauge, const VectorXd& force = {}) {
-  std::string text = "# unrig_run = 1\n# kind = \"" + std::string(force.size() > 0 ? "forced" : "pluck") + "\"\n# density = \"1.2 kg/m^3\"\n# speed = \"0 m/s\"\ntime [s],gauge [N]" +
+  std::string text = "# unrig_run = 1\n# kind = \"" + std::string(force.size() > 0 ? "forced" : "step") + "\"\n# density = \"1.2 kg/m^3\"\n# speed = \"0 m/s\"\ntime [s],gauge [N]" +
                      (force.size() > 0 ? ",force [N]" : "") + "\n";
   for (Index k = 0; k < gauge.size(); ++k) {
     text += fmt::format("{:.3f},{:.6g}", 0.002 * static_cast<double>(k), gauge[k]);
