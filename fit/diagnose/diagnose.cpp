@@ -21,6 +21,7 @@
 #include "fit/diagnose/rig_description.h"
 #include "fit/diagnose/selection.h"
 #include "fit/laws/law_search.h"
+#include "fit/search/decays_first.h"
 #include "fit/search/effect_search.h"
 #include "fit/fit_description.h"
 #include "fit/givens/inexact_rig.h"
@@ -421,16 +422,23 @@ Diagnosis diagnose_in_order(const DiagnoseProblem& problem, bool numbers_known) 
     return true;
   };
   Trial best_set = baseline;
-  // Far from the noise a law shows in the force that is missing, in a second: where one leaves nothing, no set of effects is looked for.
+  // Far from the noise a law shows in the force that is missing, in a second: where one leaves nothing, no set of effects is looked for. Where all runs are driven each law costs a search from first guesses.
   const bool may_find_laws = problem.laws && !problem.verdict_only && problem.effects.empty() && d.mismatch.found;
   const bool described_already = description && description->left < explained;
   std::vector<Trial> laws_tried;
   std::optional<Laws> laws;
   FoundSet found = look_at(problem, files, baseline, files, baseline, 0);
-  if (may_find_laws && !described_already && baseline.reduced_chi2() > nearly_explained)
+  if (may_find_laws && !described_already && !all_driven(baseline.arrival.joint) && baseline.reduced_chi2() > nearly_explained)
     time.spend([&] {
       laws_tried = search_laws(fit_problem, baseline, baseline, LawSearch::Listed::all, *selection);
-      if (std::any_of(laws_tried.begin(), laws_tried.end(), [](const Trial& t) { return !leaves_something(t); })) laws = choose_law(problem, fit_problem, files, baseline, laws_tried, *selection, found);
+      const auto clean = [](const Trial& t) { return !leaves_something(t); };
+      if (std::none_of(laws_tried.begin(), laws_tried.end(), clean) && !laws_tried.empty() && !coloured)
+        if (Trial in_its_noise = laws_tried.front(); explained_by_noise(in_its_noise)) {
+          take_noise_of(baseline, in_its_noise);
+          coloured = true;
+          laws_tried = {std::move(in_its_noise)};
+        }
+      if (std::any_of(laws_tried.begin(), laws_tried.end(), clean)) laws = choose_law(problem, fit_problem, files, baseline, laws_tried, *selection, found);
     });
   if (!laws) fit_problem.rig.laws.clear();
   if (!laws) time.spend([&] { best_set = selection->best_set(noise_or_rig); });

@@ -86,7 +86,7 @@ std::vector<std::string> LawSearch::of_the_list(const std::vector<std::string>& 
   return ids;
 }
 
-/// What one linear step from `base` promises: laws of the list and of the dictionary. Before anything else was tried only those that promise half of what the best effect of all does, a signal's included.
+/// Laws of the list and of the dictionary. Before anything else was tried those of the list that promise half of what the best effect of all does to first order, a signal's included, and forms where one of them does.
 LawSearch::Prospects LawSearch::prospects(const Trial& base) {
   if (problem_.progress) problem_.progress("looking for the law of what is missing" + (base.effects.empty() ? std::string() : " beside " + base.effects.back()));
   const std::vector<std::string> forms = forms_worth_a_fit(base);
@@ -100,12 +100,16 @@ LawSearch::Prospects LawSearch::prospects(const Trial& base) {
     set.push_back(added[i]);
     trials[i] = screened(problem_, screening, base, set);
   });
-  double best = 0;
-  for (const std::optional<Trial>& t : trials) best = std::max(best, t->score);
+  double best = 0, best_form = 0;
+  for (std::size_t i = 0; i < trials.size(); ++i) {
+    best = std::max(best, trials[i]->score);
+    if (i >= first_form) best_form = std::max(best_form, trials[i]->score);
+  }
   Prospects all;
   for (std::size_t i = 0; i < trials.size(); ++i) {
-    const bool worth_it = listed_ == Listed::only_if_named || (trials[i]->score >= half_of_it * best && brings_a_law(*trials[i]));
-    if (worth_it) (i < first_form ? all.listed : all.forms).push_back(std::move(*trials[i]));
+    const bool is_form = i >= first_form;
+    const bool worth_it = listed_ == Listed::only_if_named || ((is_form ? best_form : trials[i]->score) >= half_of_it * best && brings_a_law(*trials[i]));
+    if (worth_it) (is_form ? all.forms : all.listed).push_back(std::move(*trials[i]));
   }
   return all;
 }
@@ -136,8 +140,9 @@ bool LawSearch::goes_on(const std::vector<Trial>& tried) const {
   return !tried.empty() && tried.front().effects.size() < most_effects && leaves_something_(tried.front()) && bic_difference(tried.front(), base_) < 0;
 }
 
+/// Whether one that is tried without being named leaves nothing: the others are so rare that forms are their rivals.
 bool LawSearch::leaves_nothing_of(const std::vector<Trial>& tried) const {
-  return std::any_of(tried.begin(), tried.end(), [&](const Trial& t) { return !leaves_something_(t); });
+  return std::any_of(tried.begin(), tried.end(), [&](const Trial& t) { return effect(problem_.rig, t.effects.back()).only_if_named.empty() && !leaves_something_(t); });
 }
 
 std::vector<Trial> LawSearch::search() {
@@ -159,7 +164,7 @@ std::vector<Trial> LawSearch::search() {
     }
   }
   in_parallel(all.size(), [&](std::size_t i) {  // rivals are told apart by less than where a search among many ends
-    if (!leaves_nothing(all[i])) return;
+    if (!leaves_nothing(all[i]) && i > 0) return;
     all[i].arrival.joint.solve({});
     measure(all[i]);
   });

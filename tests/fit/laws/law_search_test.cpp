@@ -88,7 +88,7 @@ TEST_P(LawSearches, FindTheFormAndItsParameters) {
   const Trial base = fit_baseline(problem);
   ASSERT_GT(base.reduced_chi2(), 10) << "a linear rig does not explain it";
   const auto leaves_something = [](const Trial& t) { return what_remains(t).found; };
-  LawSearch search(problem, base, leaves_something);
+  LawSearch search(problem, base, leaves_something, LawSearch::Listed::only_if_named);
   const std::vector<Trial> found = search.search();
   ASSERT_FALSE(found.empty());
   EXPECT_FALSE(leaves_something(found.front())) << found.front().effects.back();

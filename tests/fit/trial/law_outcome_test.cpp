@@ -23,7 +23,7 @@ MissingEffect missing(const std::string& effect, const std::string& kind) {
 
 MissingEffect missing(const Law& law) {
   MissingEffect m = missing(law.id(), law.kind());
-  m.law = FoundLaw{law, {}, {}};
+  m.law = FoundLaw{law, {}};
   return m;
 }
 
