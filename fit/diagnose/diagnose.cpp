@@ -18,6 +18,7 @@
 #include "fit/diagnose/as_given.h"
 #include "fit/diagnose/exact_model.h"
 #include "fit/diagnose/explanation.h"
+#include "fit/diagnose/law_answer.h"
 #include "fit/diagnose/rig_description.h"
 #include "fit/diagnose/selection.h"
 #include "fit/laws/law_search.h"
@@ -293,82 +294,12 @@ bool weigh(const DiagnoseProblem& problem, const Setting& files, const Trial& ba
   return true;
 }
 
-/// What a search for laws came to.
-struct Laws {
-  std::vector<Trial> tried;  ///< the best first, which is what was found
-  std::vector<Rival> rivals;
-};
-
-bool leaves_something(const Trial& t) { return what_remains(t).found; }
-
-/// Whether the runs determine no parameter of some member: what they then say is that something acts, not by which equation.
-bool is_undetermined(const FitProblem& problem, const Trial& set) {
-  FitProblem with = problem;
-  with.effects = set.effects;
-  with.rig.laws = set.arrival.joint.model().rig().laws;
-  Arrival arrival = set.arrival;
-  const FitResult fit = describe_fit(arrival, with, Settle::nothing);
-  return std::any_of(set.effects.begin(), set.effects.end(), [&](const std::string& id) {
-    const auto is_own = [&](const FittedParameter& p) { return p.name.starts_with(id + "."); };
-    const auto is_known = [&](const FittedParameter& p) { return is_own(p) && p.identified; };
-    return std::any_of(fit.parameters.begin(), fit.parameters.end(), is_own) && std::none_of(fit.parameters.begin(), fit.parameters.end(), is_known);
-  });
-}
-
-/// Laws beside `base`, which the ranking gets.
-std::vector<Trial> search_laws(FitProblem& fit_problem, const Trial& baseline, const Trial& base, LawSearch::Listed listed, Selection& selection) {
-  std::vector<Trial> tried = LawSearch(fit_problem, base, leaves_something, listed).search();
-  for (const Trial& t : tried) selection.add({t.effects, t.reduced_chi2(), bic_difference(t, baseline), 0, 0});
-  return tried;
-}
-
-/// The law of what no effect explains: beside nothing, since an effect of the list may stand in for it, and beside the best set. A law that is on the list goes by its id: an effect of the list comes first where
-/// no form is decisively better. What leaves nothing comes before the rest: of sets that set decays aside the evidence is that of the other runs. Where the first is named, leaves nothing or is no worse than any
-/// set that was tried, and is decisively better than what was `found`, it is in `found`. An equation of which the runs determine nothing is no answer.
-std::optional<Laws> choose_law(const DiagnoseProblem& problem, FitProblem& fit_problem, const Setting& files, const Trial& baseline, std::vector<Trial> tried, const Selection& selection, FoundSet& found) {
-  Laws laws{std::move(tried), {}};
-  std::stable_sort(laws.tried.begin(), laws.tried.end(), [](const Trial& a, const Trial& b) { return bic_difference(a, b) < 0; });
-  fit_problem.rig.laws.clear();
-  std::vector<Trial> undetermined;  // no answers, but not refuted either
-  while (!laws.tried.empty() && is_undetermined(fit_problem, laws.tried.front())) {
-    undetermined.push_back(std::move(laws.tried.front()));
-    laws.tried.erase(laws.tried.begin());
-  }
-  if (laws.tried.empty()) return std::nullopt;
-  const auto rest = std::stable_partition(laws.tried.begin(), laws.tried.end(), [](const Trial& t) { return !leaves_something(t); });
-  const auto last = rest == laws.tried.begin() ? laws.tried.end() : rest;
-  const auto listed = std::find_if(laws.tried.begin(), last, [](const Trial& t) { return !is_law_id(t.effects.back()); });
-  if (listed != last && bic_difference(*listed, laws.tried.front()) < decisive) std::rotate(laws.tried.begin(), listed, listed + 1);
-  fit_problem.rig.laws = laws.tried.front().arrival.joint.model().rig().laws;
-  FoundSet with = look_at(problem, files, baseline, files, laws.tried.front(), 0);
-  const bool holds = with.clean() || bic_difference(with.best, baseline) < selection.ranking().front().delta_bic + decisive;
-  if (naming_of(with.best, baseline, with.clean(), with.predicts) != Naming::named || !holds || !(bic_difference(with.best, found.best) < -decisive)) {
-    fit_problem.rig.laws.clear();
-    return std::nullopt;
-  }
-  found = std::move(with);
-  laws.tried.insert(laws.tried.begin() + 1, std::make_move_iterator(undetermined.begin()), std::make_move_iterator(undetermined.end()));
-  laws.rivals = rivals(laws.tried, leaves_something, decisive);
-  return laws;
-}
-
 /// The exact model of a trial, against what was tried before laws.
 std::unique_ptr<ExactModel> held_against(const HiddenLaw& hidden, const FitProblem& files, const Trial& base, const Selection& selection, const FoundSet& found) {
   auto exact = std::make_unique<ExactModel>(hidden, files, base);
   for (const Trial& t : selection.tried()) exact->hold_against(t);
   exact->hold_against(found.best);
   return exact;
-}
-
-/// Laws among `set`, told as such; the rig keeps only those at work.
-void tell_laws(FitProblem& fit_problem, const Laws& laws, const FoundSet& found, std::vector<MissingEffect>& set, Diagnosis& d) {
-  for (MissingEffect& m : set)
-    if (is_law_id(m.effect)) {
-      m.law = found_law(fit_problem.rig, m.effect, found.fit);
-      if (m.effect == found.best.effects.back()) m.law->rivals = laws.rivals;
-    }
-  std::erase_if(fit_problem.rig.laws, [&](const auto& law) { return std::find(found.best.effects.begin(), found.best.effects.end(), law->id) == found.best.effects.end(); });
-  d.laws = fit_problem.rig.laws;
 }
 
 Diagnosis diagnose_in_order(const DiagnoseProblem& problem, bool numbers_known) {
@@ -430,15 +361,18 @@ Diagnosis diagnose_in_order(const DiagnoseProblem& problem, bool numbers_known) 
   FoundSet found = look_at(problem, files, baseline, files, baseline, 0);
   if (may_find_laws && !described_already && !all_driven(baseline.arrival.joint) && baseline.reduced_chi2() > nearly_explained)
     time.spend([&] {
+      tell("looking for a law in the force that is missing");
       laws_tried = search_laws(fit_problem, baseline, baseline, LawSearch::Listed::all, *selection);
-      const auto clean = [](const Trial& t) { return !leaves_something(t); };
-      if (std::none_of(laws_tried.begin(), laws_tried.end(), clean) && !laws_tried.empty() && !coloured)
-        if (Trial in_its_noise = laws_tried.front(); explained_by_noise(in_its_noise)) {
+      if (none_leaves_nothing(laws_tried) && !laws_tried.empty() && !coloured)
+        if (Trial in_its_noise = laws_tried.front(); explained_by_noise(in_its_noise)) {  // all is held against each other anew
           take_noise_of(baseline, in_its_noise);
           coloured = true;
-          laws_tried = {std::move(in_its_noise)};
+          d.mismatch = locate_mismatch(baseline.arrival.joint);
+          selection = std::make_unique<Selection>(problem, fit_problem, baseline);
+          found = look_at(problem, files, baseline, files, baseline, 0);
+          laws_tried = search_laws(fit_problem, baseline, baseline, LawSearch::Listed::all, *selection);
         }
-      if (std::any_of(laws_tried.begin(), laws_tried.end(), clean)) laws = choose_law(problem, fit_problem, files, baseline, laws_tried, *selection, found);
+      if (!none_leaves_nothing(laws_tried)) laws = choose_law(problem, fit_problem, files, baseline, laws_tried, *selection, found);
     });
   if (!laws) fit_problem.rig.laws.clear();
   if (!laws) time.spend([&] { best_set = selection->best_set(noise_or_rig); });
@@ -460,9 +394,13 @@ Diagnosis diagnose_in_order(const DiagnoseProblem& problem, bool numbers_known) 
   if (problem.hidden) exact = held_against(*problem.hidden, described ? *description->problem : fit_problem, described ? description->trial : baseline, *selection, found);
   if (may_find_laws && !laws && !described && !found.explains())
     time.spend([&] {
-      if (laws_tried.empty()) laws_tried = search_laws(fit_problem, baseline, baseline, LawSearch::Listed::only_if_named, *selection);
-      if (!found.best.effects.empty())
-        for (Trial& t : search_laws(fit_problem, baseline, found.best, LawSearch::Listed::only_if_named, *selection)) laws_tried.push_back(std::move(t));
+      tell("looking for the law of what is missing");
+      const auto add_beside = [&](const Trial& base) {
+        for (Trial& t : search_laws(fit_problem, baseline, base, LawSearch::Listed::only_if_named, *selection)) laws_tried.push_back(std::move(t));
+      };
+      const bool forms_were_fitted = std::any_of(laws_tried.begin(), laws_tried.end(), [](const Trial& t) { return is_law_id(t.effects.back()); });
+      if (!forms_were_fitted) add_beside(baseline);
+      if (!found.best.effects.empty()) add_beside(found.best);
       laws = choose_law(problem, fit_problem, files, baseline, laws_tried, *selection, found);
     });
   for (const Trial& t : laws_tried)

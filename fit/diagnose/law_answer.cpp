@@ -1,0 +1,77 @@
+#include "fit/diagnose/law_answer.h"
+
+#include <algorithm>
+#include <iterator>
+#include <utility>
+
+#include "core/effects/effect.h"
+#include "core/law/law_effect.h"
+#include "fit/fit_description.h"
+
+namespace unrig {
+namespace {
+
+bool leaves_something(const Trial& t) { return what_remains(t).found; }
+
+/// Whether the runs determine no parameter of some member: what they then say is that something acts, not by which equation.
+bool is_undetermined(const FitProblem& problem, const Trial& set) {
+  FitProblem with = problem;
+  with.effects = set.effects;
+  with.rig.laws = set.arrival.joint.model().rig().laws;
+  Arrival arrival = set.arrival;
+  const FitResult fit = describe_fit(arrival, with, Settle::nothing);
+  return std::any_of(set.effects.begin(), set.effects.end(), [&](const std::string& id) {
+    const auto is_own = [&](const FittedParameter& p) { return p.name.starts_with(id + "."); };
+    const auto is_known = [&](const FittedParameter& p) { return is_own(p) && p.identified; };
+    return std::any_of(fit.parameters.begin(), fit.parameters.end(), is_own) && std::none_of(fit.parameters.begin(), fit.parameters.end(), is_known);
+  });
+}
+
+}  // namespace
+
+bool none_leaves_nothing(const std::vector<Trial>& tried) { return std::all_of(tried.begin(), tried.end(), leaves_something); }
+
+std::vector<Trial> search_laws(FitProblem& fit_problem, const Trial& baseline, const Trial& base, LawSearch::Listed listed, Selection& selection) {
+  std::vector<Trial> tried = LawSearch(fit_problem, base, leaves_something, listed).search();
+  for (const Trial& t : tried) selection.add({t.effects, t.reduced_chi2(), bic_difference(t, baseline), 0, 0});
+  return tried;
+}
+
+std::optional<Laws> choose_law(const DiagnoseProblem& problem, FitProblem& fit_problem, const Setting& files, const Trial& baseline, std::vector<Trial> tried, const Selection& selection, FoundSet& found) {
+  Laws laws{std::move(tried), {}};
+  std::stable_sort(laws.tried.begin(), laws.tried.end(), [](const Trial& a, const Trial& b) { return bic_difference(a, b) < 0; });
+  fit_problem.rig.laws.clear();
+  std::vector<Trial> undetermined;  // no answers, but not refuted either
+  while (!laws.tried.empty() && is_undetermined(fit_problem, laws.tried.front())) {
+    undetermined.push_back(std::move(laws.tried.front()));
+    laws.tried.erase(laws.tried.begin());
+  }
+  if (laws.tried.empty()) return std::nullopt;
+  const auto rest = std::stable_partition(laws.tried.begin(), laws.tried.end(), [](const Trial& t) { return !leaves_something(t); });
+  const auto last = rest == laws.tried.begin() ? laws.tried.end() : rest;
+  const auto listed = std::find_if(laws.tried.begin(), last, [](const Trial& t) { return !is_law_id(t.effects.back()); });
+  if (listed != last && bic_difference(*listed, laws.tried.front()) < decisive) std::rotate(laws.tried.begin(), listed, listed + 1);
+  fit_problem.rig.laws = laws.tried.front().arrival.joint.model().rig().laws;
+  FoundSet with = look_at(problem, files, baseline, files, laws.tried.front(), 0);
+  const bool holds = with.clean() || bic_difference(with.best, baseline) < selection.ranking().front().delta_bic + decisive;
+  if (naming_of(with.best, baseline, with.clean(), with.predicts) != Naming::named || !holds || !(bic_difference(with.best, found.best) < -decisive)) {
+    fit_problem.rig.laws.clear();
+    return std::nullopt;
+  }
+  found = std::move(with);
+  laws.tried.insert(laws.tried.begin() + 1, std::make_move_iterator(undetermined.begin()), std::make_move_iterator(undetermined.end()));
+  laws.rivals = rivals(laws.tried, leaves_something, decisive);
+  return laws;
+}
+
+void tell_laws(FitProblem& fit_problem, const Laws& laws, const FoundSet& found, std::vector<MissingEffect>& set, Diagnosis& d) {
+  for (MissingEffect& m : set)
+    if (is_law_id(m.effect)) {
+      m.law = found_law(fit_problem.rig, m.effect, found.fit);
+      if (m.effect == found.best.effects.back()) m.law->rivals = laws.rivals;
+    }
+  std::erase_if(fit_problem.rig.laws, [&](const auto& law) { return std::find(found.best.effects.begin(), found.best.effects.end(), law->id) == found.best.effects.end(); });
+  d.laws = fit_problem.rig.laws;
+}
+
+}  // namespace unrig
