@@ -86,7 +86,7 @@ std::vector<std::string> LawSearch::of_the_list(const std::vector<std::string>& 
   return ids;
 }
 
-/// Laws of the list and of the dictionary. Before anything else was tried those of the list that promise half of what the best effect of all does to first order, a signal's included, and forms where one of them does.
+/// Laws of the list and of the dictionary. Before anything else was tried: where one of them promises most of all effects to first order those of the list that promise half as much, and forms where one of them does.
 LawSearch::Prospects LawSearch::prospects(const Trial& base) {
   if (problem_.progress) problem_.progress("looking for the law of what is missing" + (base.effects.empty() ? std::string() : " beside " + base.effects.back()));
   const std::vector<std::string> forms = forms_worth_a_fit(base);
@@ -100,11 +100,13 @@ LawSearch::Prospects LawSearch::prospects(const Trial& base) {
     set.push_back(added[i]);
     trials[i] = screened(problem_, screening, base, set);
   });
-  double best = 0, best_form = 0;
+  double best = 0, best_law = 0, best_form = 0;
   for (std::size_t i = 0; i < trials.size(); ++i) {
     best = std::max(best, trials[i]->score);
+    if (brings_a_law(*trials[i])) best_law = std::max(best_law, trials[i]->score);
     if (i >= first_form) best_form = std::max(best_form, trials[i]->score);
   }
+  if (listed_ == Listed::all && best_law < best) return {};
   Prospects all;
   for (std::size_t i = 0; i < trials.size(); ++i) {
     const bool is_form = i >= first_form;

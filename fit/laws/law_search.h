@@ -17,8 +17,8 @@ namespace unrig {
 ///    named are fitted too where a form of their kind is. All are held against each other by BIC.
 /// 4. Where the best leaves something, a second law is looked for beside it.
 ///
-/// Before anything else was tried (Listed::all) laws of the list come first, one and a second beside it, and forms only where these leave something; of both only what promises half of what the best effect does, to
-/// first order (Screening).
+/// Before anything else was tried (Listed::all) laws are looked for where one of them promises most of all effects, signals included, to first order (Screening): laws of the list first, one and a second beside it, and
+/// forms only where these leave something; of both only what promises half as much.
 ///
 /// Source: M. Alvarez, D. Luengo and N. Lawrence, Latent force models, AISTATS (2009); S. L. Brunton, J. L. Proctor and J. N. Kutz, PNAS 113 (2016) 3932, whose candidates are regressed on derivatives, here on readings.
 class LawSearch {
