@@ -94,7 +94,7 @@ double white_variance(const DecayModel& model, double chi2, std::size_t poles) {
 }
 
 // While searching, a fit need only be good enough to show what it leaves over.
-constexpr double search_tolerance = 1e-6;
+constexpr double search_precision = 0.3;  // standard errors
 constexpr int search_iterations = 8;
 
 /// Takes up poles while the record asks for them. Returns false where `most` did not suffice.
@@ -106,7 +106,7 @@ bool find_poles(const DecayModel& model, Index most, std::vector<Pole>& poles) {
     if (static_cast<Index>(poles.size()) >= most) return false;
     std::vector<Pole> trial = poles;
     trial.push_back(candidate.pole);
-    fit_poles(model, trial, search_tolerance, search_iterations);
+    fit_poles(model, trial, search_precision, search_iterations);
     const DecayModel::Evaluation next = model.evaluate(trial, false);
     if (now.chi2 - next.chi2 < candidate.threshold) return true;
     poles = std::move(trial);
@@ -123,7 +123,7 @@ void drop_superfluous(const DecayModel& model, std::vector<Pole>& poles) {
     significance.minCoeff(&weakest);
     std::vector<Pole> fewer = poles;
     fewer.erase(fewer.begin() + weakest);
-    const double rise = fit_poles(model, fewer, search_tolerance, search_iterations) - all.chi2;
+    const double rise = fit_poles(model, fewer, search_precision, search_iterations) - all.chi2;
     const double degrees = 2.0 + 2.0 * static_cast<double>(model.channels());
     const double limit = degrees + 2 * std::log(static_cast<double>(model.samples()) / false_alarm);
     if (rise > limit * white_variance(model, all.chi2, poles.size())) return;

@@ -1,13 +1,14 @@
 #include "fit/apparent_mass/decay_model.h"
 
-#include <ceres/ceres.h>
-
+#include <Eigen/LU>
 #include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
 #include <complex>
 #include <numbers>
 #include <stdexcept>
+
+#include "fit/solver/least_squares.h"
 
 namespace unrig {
 namespace {
@@ -39,29 +40,11 @@ MatrixXd columns_of(const MatrixXcd& z) {
   return columns;
 }
 
-/// Ceres' view: the poles in one block, (omega, decay) each.
-class DecayCost : public ceres::CostFunction {
- public:
-  DecayCost(const DecayModel& model, std::size_t poles) : model_(model), poles_(poles) {
-    set_num_residuals(static_cast<int>(model.samples() * model.channels()));
-    mutable_parameter_block_sizes()->push_back(static_cast<int>(2 * poles));
-  }
-  bool Evaluate(double const* const* values, double* residuals, double** jacobians) const override {
-    std::vector<Pole> poles(poles_);
-    for (std::size_t m = 0; m < poles_; ++m) poles[m] = {values[0][2 * m], values[0][2 * m + 1]};
-    const bool derivatives = jacobians != nullptr && jacobians[0] != nullptr;
-    const DecayModel::Evaluation e = model_.evaluate(poles, derivatives);
-    if (!std::isfinite(e.chi2)) return false;
-    Eigen::Map<VectorXd>(residuals, num_residuals()) = e.residual;
-    using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
-    if (derivatives) Eigen::Map<RowMajor>(jacobians[0], e.jacobian.rows(), e.jacobian.cols()) = e.jacobian;
-    return true;
-  }
-
- private:
-  const DecayModel& model_;
-  std::size_t poles_;
-};
+std::vector<Pole> poles_of(const VectorXd& values) {
+  std::vector<Pole> poles;
+  for (Index m = 0; 2 * m < values.size(); ++m) poles.push_back({values[2 * m], values[2 * m + 1]});
+  return poles;
+}
 
 }  // namespace
 
@@ -125,34 +108,32 @@ DecayModel::Evaluation DecayModel::evaluate(const std::vector<Pole>& poles, bool
   return e;
 }
 
-double fit_poles(const DecayModel& model, std::vector<Pole>& poles, double tolerance, int iterations) {
+double fit_poles(const DecayModel& model, std::vector<Pole>& poles, double precision, int iterations) {
   if (poles.empty()) return model.evaluate(poles, false).chi2;
   const double lowest = 0.2 * 2 * std::numbers::pi / model.duration(), highest = std::numbers::pi / model.dt();
   const double growth = -3 / model.duration(), fastest = 1 / model.dt();
-  VectorXd values(2 * static_cast<Index>(poles.size()));
-  ceres::Problem problem;
-  problem.AddParameterBlock(values.data(), static_cast<int>(values.size()));
-  for (std::size_t m = 0; m < poles.size(); ++m) {
-    const auto i = static_cast<int>(2 * m);
-    values[i] = std::clamp(poles[m].omega, lowest, highest);
-    values[i + 1] = std::clamp(poles[m].decay, growth, fastest);
-    problem.SetParameterLowerBound(values.data(), i, lowest);
-    problem.SetParameterUpperBound(values.data(), i, highest);
-    problem.SetParameterLowerBound(values.data(), i + 1, growth);
-    problem.SetParameterUpperBound(values.data(), i + 1, fastest);
+  LeastSquaresProblem problem;
+  ResidualTerm term;
+  for (const Pole& pole : poles) {
+    problem.unknowns.push_back({"omega", pole.omega, lowest, highest});
+    problem.unknowns.push_back({"decay", pole.decay, growth, fastest});
   }
-  problem.AddResidualBlock(new DecayCost(model, poles.size()), nullptr, values.data());
-  ceres::Solver::Options options;
-  options.linear_solver_type = ceres::DENSE_NORMAL_CHOLESKY;
-  options.max_num_iterations = iterations;
-  options.function_tolerance = tolerance;
-  options.parameter_tolerance = 1e-13;
-  options.gradient_tolerance = 1e-14;
-  options.logging_type = ceres::SILENT;
-  ceres::Solver::Summary summary;
-  ceres::Solve(options, &problem, &summary);
-  for (std::size_t m = 0; m < poles.size(); ++m) poles[m] = {values[static_cast<Index>(2 * m)], values[static_cast<Index>(2 * m + 1)]};
-  return 2 * summary.final_cost;
+  for (std::size_t i = 0; i < problem.unknowns.size(); ++i) term.unknowns.push_back(i);
+  term.size = model.samples() * model.channels();
+  term.evaluate = [&](const VectorXd& values, VectorXd& residual, MatrixXd* jacobian) {
+    DecayModel::Evaluation e = model.evaluate(poles_of(values), jacobian != nullptr);
+    residual = std::move(e.residual);
+    if (jacobian != nullptr) *jacobian = std::move(e.jacobian);
+    return std::isfinite(e.chi2);
+  };
+  problem.terms.push_back(std::move(term));
+  LeastSquaresOptions options;
+  options.effort = LeastSquaresOptions::Effort::once;
+  options.precision = precision;
+  options.iterations = iterations;
+  const LeastSquaresResult result = solve_least_squares(problem, options);
+  poles = poles_of(result.point.values);
+  return result.chi2();
 }
 
 }  // namespace unrig

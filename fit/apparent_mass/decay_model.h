@@ -47,10 +47,9 @@ class DecayModel {
   Eigen::Index observations_ = 0;
 };
 
-/// Least squares over all poles at once (Ceres, Levenberg-Marquardt, exact derivatives), from and to `poles`; returns chi-square.
-/// `tolerance`: relative fall of chi-square in the last step; of 2500 samples, 1e-9 is a hundredth of a standard error or less.
+/// Least squares over all poles at once, by exact derivatives, from and to `poles`; returns chi-square. `precision`: the search ends where a step of so many standard errors is left.
 /// Bounds keep a pole inside what the record can show: 0.2 periods in the record to the Nyquist frequency, growth by at most e^3 over the record,
 /// decay by at most a factor e in a sample.
-double fit_poles(const DecayModel& model, std::vector<Pole>& poles, double tolerance = 1e-9, int iterations = 100);
+double fit_poles(const DecayModel& model, std::vector<Pole>& poles, double precision = 1e-2, int iterations = 100);
 
 }  // namespace unrig

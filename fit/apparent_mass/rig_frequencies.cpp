@@ -1,13 +1,12 @@
 #include "fit/apparent_mass/rig_frequencies.h"
 
-#include <ceres/ceres.h>
-
 #include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <numbers>
+
+#include "fit/solver/least_squares.h"
 
 namespace unrig {
 namespace {
@@ -111,45 +110,6 @@ std::optional<RigScales> scan(const ObservedRun& dry, const ObservedRun& wet) {
   return best;
 }
 
-/// (observed - model) / error of all matched frequencies, and the prior; unknowns: ln k_n, ln k_t, ln C_a.
-class FrequencyCost : public ceres::CostFunction {
- public:
-  FrequencyCost(const ObservedRun& dry, const ObservedRun& wet, std::optional<double> common_error, double error_scale)
-      : runs_{&dry, &wet}, common_error_(common_error), error_scale_(error_scale) {
-    int rows = 1;
-    for (const ObservedRun* run : runs_)
-      for (const ObservedFrequency& f : run->observed) rows += f.mode ? 1 : 0;
-    set_num_residuals(rows);
-    mutable_parameter_block_sizes()->push_back(3);
-  }
-  bool Evaluate(double const* const* values, double* residuals, double** jacobians) const override {
-    const RigScales scales = Eigen::Map<const Vector3d>(values[0]).array().exp();
-    double* slopes = jacobians ? jacobians[0] : nullptr;
-    const auto add = [&](double residual, const Eigen::RowVector3d& slope) {
-      *residuals++ = residual;
-      if (slopes == nullptr) return;
-      std::copy_n(slope.data(), 3, slopes);
-      slopes += 3;
-    };
-    for (const ObservedRun* run : runs_) {
-      const NaturalFrequencies model = natural_frequencies(run->system, scales);
-      if (!model.hertz.allFinite()) return false;
-      for (const ObservedFrequency& f : run->observed) {
-        if (!f.mode) continue;
-        const double error = common_error_ ? *common_error_ * f.hertz : error_scale_ * f.std_error;
-        add((f.hertz - model.hertz[*f.mode]) / error, -model.slope.row(*f.mode).cwiseProduct(scales.transpose()) / error);
-      }
-    }
-    add((values[0][torsion_scale] - values[0][normal_scale]) / ratio_width, Eigen::RowVector3d(-1, 1, 0) / ratio_width);
-    return true;
-  }
-
- private:
-  std::array<const ObservedRun*, 2> runs_;
-  std::optional<double> common_error_;
-  double error_scale_;
-};
-
 struct Solution {
   RigScales scales;
   Eigen::Matrix3d covariance;  // of the logarithms
@@ -157,27 +117,41 @@ struct Solution {
   Index rows = 0;
 };
 
-/// `common_error`: relative error of every frequency, in place of their own.
+/// (observed - model) / error of all matched frequencies, and the prior; unknowns: ln k_n, ln k_t, ln C_a. `common_error`: relative error of every frequency, in place of their own.
 Solution solve(const ObservedRun& dry, const ObservedRun& wet, const RigScales& start, std::optional<double> common_error, double error_scale = 1) {
-  Vector3d logs = start.array().log();
-  ceres::Problem problem;
-  auto* cost = new FrequencyCost(dry, wet, common_error, error_scale);
-  problem.AddResidualBlock(cost, nullptr, logs.data());
-  ceres::Solver::Options options;
-  options.linear_solver_type = ceres::DENSE_QR;
-  options.function_tolerance = 1e-14;
-  options.parameter_tolerance = 1e-14;
-  options.gradient_tolerance = 1e-16;
-  options.logging_type = ceres::SILENT;
-  ceres::Solver::Summary summary;
-  ceres::Solve(options, &problem, &summary);
-  Eigen::Matrix<double, Eigen::Dynamic, 3, Eigen::RowMajor> jacobian(cost->num_residuals(), 3);
-  VectorXd residual(cost->num_residuals());
-  const double* values[] = {logs.data()};
-  double* slopes[] = {jacobian.data()};
-  cost->Evaluate(values, residual.data(), slopes);
-  const Eigen::Matrix3d information = jacobian.transpose() * jacobian;
-  return {logs.array().exp(), information.ldlt().solve(Eigen::Matrix3d::Identity()), residual.squaredNorm(), residual.size()};
+  const auto matched = [](const ObservedRun& run) { return std::count_if(run.observed.begin(), run.observed.end(), [](const ObservedFrequency& f) { return f.mode.has_value(); }); };
+  LeastSquaresProblem problem;
+  for (const auto& [name, scale] : {std::pair("ln k_n", start[normal_scale]), std::pair("ln k_t", start[torsion_scale]), std::pair("ln C_a", start[apparent_mass])})
+    problem.unknowns.push_back({name, std::log(scale)});
+  ResidualTerm term;
+  term.unknowns = {0, 1, 2};
+  term.size = matched(dry) + matched(wet) + 1;
+  term.evaluate = [&](const VectorXd& logs, VectorXd& residual, MatrixXd* jacobian) {
+    const RigScales scales = logs.array().exp();
+    Index row = 0;
+    const auto add = [&](double value, const Eigen::RowVector3d& slope) {
+      residual[row] = value;
+      if (jacobian != nullptr) jacobian->row(row) = slope;
+      ++row;
+    };
+    for (const ObservedRun* run : {&dry, &wet}) {
+      const NaturalFrequencies model = natural_frequencies(run->system, scales);
+      if (!model.hertz.allFinite()) return false;
+      for (const ObservedFrequency& f : run->observed) {
+        if (!f.mode) continue;
+        const double error = common_error ? *common_error * f.hertz : error_scale * f.std_error;
+        add((f.hertz - model.hertz[*f.mode]) / error, -model.slope.row(*f.mode).cwiseProduct(scales.transpose()) / error);
+      }
+    }
+    add((logs[torsion_scale] - logs[normal_scale]) / ratio_width, Eigen::RowVector3d(-1, 1, 0) / ratio_width);
+    return true;
+  };
+  problem.terms.push_back(std::move(term));
+  LeastSquaresOptions options;
+  options.effort = LeastSquaresOptions::Effort::once;
+  const LeastSquaresPoint point = solve_least_squares(problem, options).point;
+  const Eigen::Matrix3d information = point.jacobian.transpose() * point.jacobian;
+  return {point.values.array().exp(), information.ldlt().solve(Eigen::Matrix3d::Identity()), point.chi2(), point.residual.size()};
 }
 
 /// Takes the matches at these scales; returns whether any changed.
