@@ -6,6 +6,7 @@
 
 #include "fit/diagnose/diagnose.h"
 #include "tests/support/band.h"
+#include "tests/support/long_tests.h"
 #include "tests/support/shared_data.h"
 
 namespace unrig {
@@ -15,8 +16,11 @@ using testing::Contains;
 using testing::ElementsAre;
 using testing::IsSupersetOf;
 
-DiagnoseProblem recording(const std::string& rig, const std::string& run) {
+/// Of these candidates; of all of the list, which takes minutes under the sanitizers, where long tests are wanted.
+DiagnoseProblem recording(const std::string& rig, const std::string& run, const std::vector<std::string>& candidates = {}) {
   DiagnoseProblem problem;
+  problem.laws = candidates.empty();  // otherwise effects of the list are asked for
+  if (!test::long_tests_wanted()) problem.effects = candidates;
   problem.rig = read_rig(test::shared_path("real/" + rig + "/rig.toml"));
   problem.runs.push_back(read_run(test::shared_path("real/" + rig + "/" + run)));
   return problem;
@@ -38,8 +42,7 @@ std::vector<std::string> names(const std::vector<MissingEffect>& effects) {
 /// both terms 0.0186 deg (measured independently of this project).
 TEST(DiagnosedRecordings, ShipRollHasQuadraticDampingAndNonlinearStiffness) {
   UNRIG_NEEDS_SHARED("real/ship_roll/run_21337.csv");
-  DiagnoseProblem problem = recording("ship_roll", "run_21337.csv");
-  problem.laws = false;  // effects of the list are asked for
+  DiagnoseProblem problem = recording("ship_roll", "run_21337.csv", {"cubic-stiffness", "coulomb-friction", "quadratic-drag", "gauge-drift"});
   const Diagnosis d = diagnose(problem);
   EXPECT_THAT(names(d.missing), IsSupersetOf({"quadratic-drag", "cubic-stiffness"}));
   constexpr double degree = 3.14159265358979323846 / 180;
@@ -66,10 +69,9 @@ TEST(DiagnosedRecordings, OscillatorHasCubicStiffness) {
 /// Swings of a pendulum until dry friction in its bearing stops it: 3.83 mrad without, 0.94 to 1.01 mrad with the right terms.
 TEST(DiagnosedRecordings, PendulumHasDryFriction) {
   UNRIG_NEEDS_SHARED("real/pendulum/swing.csv");
-  DiagnoseProblem problem = recording("pendulum", "swing.csv");
+  DiagnoseProblem problem = recording("pendulum", "swing.csv", {"cubic-stiffness", "coulomb-friction", "quadratic-drag", "gauge-drift"});
   constexpr double sticks = 6.3;  // s
   problem.runs = {parted(problem.runs.front(), sticks).first};
-  problem.laws = false;  // effects of the list are asked for
   const Diagnosis d = diagnose(problem);
   EXPECT_THAT(names(d.missing), Contains("coulomb-friction"));
   EXPECT_TRUE(d.unexplained) << "the encoder's noise is a tenth of what is left";
