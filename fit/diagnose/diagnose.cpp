@@ -353,13 +353,13 @@ Diagnosis diagnose_in_order(const DiagnoseProblem& problem, bool numbers_known) 
     return true;
   };
   Trial best_set = baseline;
-  // Far from the noise a law shows in the force that is missing, in a second: where one leaves nothing, no set of effects is looked for. Where all runs are driven each law costs a search from first guesses.
+  // A law shows in the force that is missing, in a second: where one leaves nothing, no set of effects is looked for. Where all runs are driven each law costs a search from first guesses.
   const bool may_find_laws = problem.laws && !problem.verdict_only && problem.effects.empty() && d.mismatch.found;
   const bool described_already = description && description->left < explained;
   std::vector<Trial> laws_tried;
   std::optional<Laws> laws;
   FoundSet found = look_at(problem, files, baseline, files, baseline, 0);
-  if (may_find_laws && !described_already && !all_driven(baseline.arrival.joint) && baseline.reduced_chi2() > nearly_explained)
+  if (may_find_laws && !described_already && !all_driven(baseline.arrival.joint))
     time.spend([&] {
       tell("looking for a law in the force that is missing");
       laws_tried = search_laws(fit_problem, baseline, baseline, LawSearch::Listed::all, *selection);

@@ -10,7 +10,6 @@
 namespace unrig {
 
 constexpr double decisive = 10;  ///< BIC: very strong evidence (Kass and Raftery, J. American Statistical Association 90 (1995) 773)
-constexpr double nearly_explained = 10;  ///< residual power over noise power: beyond it no two laws explain a mismatch alike
 
 /// What a fit leaves (locate_mismatch); of decays that are set aside, what laws leave of them that are trusted to within some per cent.
 Mismatch what_remains(const Trial& trial);

@@ -142,9 +142,11 @@ bool LawSearch::goes_on(const std::vector<Trial>& tried) const {
   return !tried.empty() && tried.front().effects.size() < most_effects && leaves_something_(tried.front()) && bic_difference(tried.front(), base_) < 0;
 }
 
-/// Whether one that is tried without being named leaves nothing: the others are so rare that forms are their rivals.
-bool LawSearch::leaves_nothing_of(const std::vector<Trial>& tried) const {
-  return std::any_of(tried.begin(), tried.end(), [&](const Trial& t) { return effect(problem_.rig, t.effects.back()).only_if_named.empty() && !leaves_something_(t); });
+/// Whether forms may explain what laws of the list do not, or as well: no rivals are looked for of one that leaves nothing of a mismatch too large for two laws to explain alike, unless it is tried only where it is named,
+/// and so rare that forms are as likely.
+bool LawSearch::may_have_rivals(const std::vector<Trial>& tried) const {
+  if (listed_ == Listed::only_if_named || base_.reduced_chi2() < nearly_explained) return true;
+  return std::none_of(tried.begin(), tried.end(), [&](const Trial& t) { return effect(problem_.rig, t.effects.back()).only_if_named.empty() && !leaves_something_(t); });
 }
 
 std::vector<Trial> LawSearch::search() {
@@ -155,7 +157,7 @@ std::vector<Trial> LawSearch::search() {
     const Trial first = all.front();
     add(followed(prospects(first).listed, first));
   }
-  if (listed_ == Listed::only_if_named || !leaves_nothing_of(all)) {
+  if (may_have_rivals(all)) {
     add(followed(std::move(alone.forms), base_));
     sort_by(all, [&](const Trial& t) { return bic_difference(t, base_); });
     if (goes_on(all)) {

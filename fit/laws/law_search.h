@@ -17,8 +17,8 @@ namespace unrig {
 ///    named are fitted too where a form of their kind is. All are held against each other by BIC.
 /// 4. Where the best leaves something, a second law is looked for beside it.
 ///
-/// Before anything else was tried (Listed::all) laws are looked for where one of them promises most of all effects, signals included, to first order (Screening): laws of the list first, one and a second beside it, and
-/// forms only where these leave something; of both only what promises half as much.
+/// Before anything else was tried (Listed::all) laws are looked for where one of them promises most of all effects, signals included, to first order (Screening), and only what promises half as much: laws of the list, one
+/// and a second beside it, and forms, which are their rivals.
 ///
 /// Source: M. Alvarez, D. Luengo and N. Lawrence, Latent force models, AISTATS (2009); S. L. Brunton, J. L. Proctor and J. N. Kutz, PNAS 113 (2016) 3932, whose candidates are regressed on derivatives, here on readings.
 class LawSearch {
@@ -42,7 +42,7 @@ class LawSearch {
   std::vector<std::string> of_the_list(const std::vector<std::string>& forms, const Trial& base) const;
   std::vector<Trial> followed(std::vector<Trial> tried, const Trial& base) const;
   bool goes_on(const std::vector<Trial>& tried) const;
-  bool leaves_nothing_of(const std::vector<Trial>& tried) const;
+  bool may_have_rivals(const std::vector<Trial>& tried) const;
 
   FitProblem& problem_;
   const Trial& base_;

@@ -29,6 +29,7 @@ struct Trial {
 
 constexpr std::size_t most_effects = 3;  ///< of one set
 constexpr double explained = 1.15;  ///< residual power over noise power of a model that leaves nothing to name
+constexpr double nearly_explained = 10;  ///< residual power over noise power: beyond it no two laws explain a mismatch alike
 inline bool leaves_nothing(const Trial& trial) { return trial.reduced_chi2() < explained; }
 
 /// Sets what a trial leaves of each run, as it stands.
