@@ -60,7 +60,7 @@ std::optional<Laws> choose_law(const DiagnoseProblem& problem, FitProblem& fit_p
   }
   found = std::move(with);
   laws.tried.insert(laws.tried.begin() + 1, std::make_move_iterator(undetermined.begin()), std::make_move_iterator(undetermined.end()));
-  laws.rivals = rivals(laws.tried, leaves_something, decisive);
+  laws.rivals = rivals(laws.tried, leaves_something);
   return laws;
 }
 

@@ -223,19 +223,11 @@ Trials Selection::try_one_more(const Trial& base, const Strings& hopeless) {
   return linear;
 }
 
-/// Takes away again what the others made superfluous; the last one too: by way of it the others may have come to a minimum that they had missed.
+/// Takes away again what the others made superfluous.
 Trial Selection::without_superfluous(Trial trial) {
-  for (std::size_t k = 0; trial.effects.size() > 1 && k < trial.effects.size();) {
-    Strings fewer = trial.effects;
-    fewer.erase(fewer.begin() + static_cast<std::ptrdiff_t>(k));
-    Trial smaller = prepare(fit_problem_, trial, fewer);
-    fit_fully(smaller, 6);
-    if (bic_difference(smaller, trial) < decisive) {
-      trial = std::move(smaller);
-      ranking_.push_back({trial.effects, trial.reduced_chi2(), bic_difference(trial, baseline_), 0, 0});
-    } else {
-      ++k;
-    }
+  for (Trial& fewer : taken_away(fit_problem_, trial)) {
+    trial = std::move(fewer);
+    ranking_.push_back({trial.effects, trial.reduced_chi2(), bic_difference(trial, baseline_), 0, 0});
   }
   return trial;
 }

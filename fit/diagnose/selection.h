@@ -9,8 +9,6 @@
 
 namespace unrig {
 
-constexpr double decisive = 10;  ///< BIC: very strong evidence (Kass and Raftery, J. American Statistical Association 90 (1995) 773)
-
 /// What a fit leaves (locate_mismatch); of decays that are set aside, what laws leave of them that are trusted to within some per cent.
 Mismatch what_remains(const Trial& trial);
 

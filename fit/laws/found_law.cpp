@@ -30,7 +30,7 @@ FoundLaw found_law(const Rig& rig, const std::string& id, const FitResult& fit) 
   return {at_values(law_of(effect(rig, id)), value_of, fit.learnt_on), {}};
 }
 
-std::vector<Rival> rivals(const std::vector<Trial>& tried, const std::function<bool(const Trial&)>& leaves_something, double decisive) {
+std::vector<Rival> rivals(const std::vector<Trial>& tried, const std::function<bool(const Trial&)>& leaves_something) {
   std::vector<Rival> all;
   for (std::size_t i = 1; i < tried.size(); ++i) {
     const Trial& t = tried[i];

@@ -27,7 +27,7 @@ struct FoundLaw {
 /// The law `id` of `rig`, at the values of a fit.
 FoundLaw found_law(const Rig& rig, const std::string& id, const FitResult& fit);
 
-/// Of all sets that were tried those that leave nothing and whose evidence is within `decisive` (a difference of BIC) of the best, which stands first and is none of them.
-std::vector<Rival> rivals(const std::vector<Trial>& tried, const std::function<bool(const Trial&)>& leaves_something, double decisive);
+/// Of all sets that were tried those that leave nothing and whose evidence is not decisively less than that of the best, which stands first and is none of them.
+std::vector<Rival> rivals(const std::vector<Trial>& tried, const std::function<bool(const Trial&)>& leaves_something);
 
 }  // namespace unrig

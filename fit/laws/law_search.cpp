@@ -59,6 +59,7 @@ std::vector<std::string> LawSearch::forms_worth_a_fit(const Trial& base) {
   if (order.size() > most_in_full) order.resize(most_in_full);
   std::erase_if(order, [&](std::size_t i) { return screened[i].gain < half_of_it * screened[order.front()].gain; });
 
+  problem_.rig.laws = base.arrival.joint.model().rig().laws;  // the rig may have got others since
   std::erase_if(problem_.rig.laws, [&](const auto& law) { return !is_among(base.effects, law->id); });
   std::vector<std::string> ids;
   for (const std::size_t i : order) {
@@ -166,6 +167,11 @@ std::vector<Trial> LawSearch::search() {
       std::move(pairs.forms.begin(), pairs.forms.end(), std::back_inserter(pairs.listed));
       add(followed(std::move(pairs.listed), first));
     }
+  }
+  sort_by(all, [&](const Trial& t) { return bic_difference(t, base_); });
+  if (!all.empty() && all.front().effects.size() > 1) {
+    problem_.rig.laws = all.front().arrival.joint.model().rig().laws;
+    add(taken_away(problem_, all.front()));
   }
   in_parallel(all.size(), [&](std::size_t i) {  // rivals are told apart by less than where a search among many ends
     if (!leaves_nothing(all[i]) && i > 0) return;

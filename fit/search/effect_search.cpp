@@ -252,6 +252,20 @@ void fit_fully(Trial& trial, int rounds) {
   measure(trial);
 }
 
+std::vector<Trial> taken_away(const FitProblem& problem, const Trial& trial) {
+  std::vector<Trial> smaller;
+  const auto now = [&]() -> const Trial& { return smaller.empty() ? trial : smaller.back(); };
+  for (std::size_t k = 0; now().effects.size() > 1 && k < now().effects.size();) {
+    std::vector<std::string> effects = now().effects;
+    effects.erase(effects.begin() + static_cast<std::ptrdiff_t>(k));
+    Trial fewer = prepare(problem, now(), effects);
+    fit_fully(fewer, 6);
+    if (bic_difference(fewer, now()) < decisive) smaller.push_back(std::move(fewer));
+    else ++k;
+  }
+  return smaller;
+}
+
 void leave_out_terms(Trial& trial) {
   const std::vector<std::string> ids = trial.effects;
   for (const std::string& id : ids) {

@@ -27,6 +27,7 @@ struct Trial {
   double excess() const;
 };
 
+constexpr double decisive = 10;  ///< BIC: very strong evidence (Kass and Raftery, J. American Statistical Association 90 (1995) 773)
 constexpr std::size_t most_effects = 3;  ///< of one set
 constexpr double explained = 1.15;  ///< residual power over noise power of a model that leaves nothing to name
 constexpr double nearly_explained = 10;  ///< residual power over noise power: beyond it no two laws explain a mismatch alike
@@ -96,6 +97,10 @@ Arrival arrive_at_effects(const FitProblem& problem);
 
 /// Fits a prepared trial with everything free, while the weights of the runs return to those of their noise, in so many rounds.
 void fit_fully(Trial& trial, int rounds);
+
+/// One set after the other with an effect fewer, of which the evidence is not decisively less: what the others made superfluous is taken away, the last effect too, by way of which they may have come to a minimum that they had
+/// missed. None where nothing is superfluous.
+std::vector<Trial> taken_away(const FitProblem& problem, const Trial& trial);
 
 /// Leaves out those terms of its effects (Effect::terms) without which the evidence is no less, held at no amplitude.
 void leave_out_terms(Trial& trial);

@@ -116,7 +116,7 @@ TEST_P(LawSearches, FindTheFormAndItsParameters) {
     EXPECT_NEAR(value("c") / scale / std::pow(value("s"), 2), square, 0.03 * square);
   }
   // Beyond chance no other rival than what such decays cannot tell apart: fewer than half of all that were fitted.
-  EXPECT_LE(2 * rivals(found, leaves_something, decisive).size(), found.size());
+  EXPECT_LE(2 * rivals(found, leaves_something).size(), found.size());
 }
 
 INSTANTIATE_TEST_SUITE_P(Of, LawSearches, testing::Range<std::size_t>(0, hidden.size()), [](const auto& which) {
