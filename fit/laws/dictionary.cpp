@@ -208,6 +208,39 @@ std::vector<Form> dictionary(const Rig& rig, const Reach& reach) {
   return forms;
 }
 
+std::vector<Eigen::Index> coefficients_of(const Law& law) {
+  std::vector<Eigen::Index> found;
+  for (std::size_t k = 0; k < law.parameters.size(); ++k)
+    if (const char c = law.parameters[k].name.front(); c == 'c' || c == 'f' || c == 'k') found.push_back(static_cast<Eigen::Index>(k));
+  return found;
+}
+
+std::vector<VectorXd> shapes_of(const Form& form, Grid grid) {
+  const bool fine = grid == Grid::fine;
+  const Law& law = form.law;
+  std::vector<VectorXd> shapes{form.starts.front()};
+  const std::vector<Eigen::Index> linear = coefficients_of(law);
+  for (std::size_t k = 0; k < law.parameters.size(); ++k) {
+    if (std::find(linear.begin(), linear.end(), static_cast<Eigen::Index>(k)) != linear.end()) continue;
+    const Parameter& p = law.parameters[k];
+    std::vector<double> values;
+    if (law.memory && p.name == "n") continue;  // of hysteresis the corner and the loop's shape
+    if (p.name == "p") values = fine ? std::vector<double>{0.5, 1.5, 2, 2.5, 3, 4, 5} : std::vector<double>{0.5, 1.2, 2, 4};
+    else if (law.memory && p.name == "b") values = fine ? std::vector<double>{-0.6, -0.3, 0, 0.5} : std::vector<double>{-0.3, 0.5};
+    else
+      for (const double factor : fine ? std::vector<double>{0.2, 0.5, 1, 2, 4} : std::vector<double>{0.3, 1, 3}) values.push_back(factor * shapes.front()[static_cast<Eigen::Index>(k)]);
+    std::vector<VectorXd> each;
+    for (const double value : values)
+      if (value >= p.lower && value <= p.upper)
+        for (VectorXd shape : shapes) {
+          shape[static_cast<Eigen::Index>(k)] = value;
+          each.push_back(std::move(shape));
+        }
+    shapes = std::move(each);
+  }
+  return shapes;
+}
+
 std::shared_ptr<const Effect> as_effect(const Form& form) {
   auto effect = std::make_shared<LawEffect>(*law_effect(form.law));
   effect->starts = form.starts;

@@ -31,6 +31,13 @@ Reach reach_of(const BesideUnknownForces& beside);
 /// angle or speed; lift that bends; last, curves without a formula of their own. Those that nothing in these runs would move are left out.
 std::vector<Form> dictionary(const Rig& rig, const Reach& reach);
 
+/// Parameters in which the force of a law of the dictionary is linear: those called c, c2 ... , f and k.
+std::vector<Eigen::Index> coefficients_of(const Law& law);
+
+/// Shapes that a form may have, at its first coefficients: exponents, corners and times over the range in which they matter; coarse where slopes in them tell the rest.
+enum class Grid { coarse, fine };
+std::vector<Eigen::VectorXd> shapes_of(const Form& form, Grid grid);
+
 /// The form as an effect of a rig, with its starts.
 std::shared_ptr<const Effect> as_effect(const Form& form);
 

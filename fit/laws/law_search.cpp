@@ -37,84 +37,108 @@ void sort_by(std::vector<T>& all, Key key) {
 
 bool is_among(const std::vector<std::string>& ids, const std::string& id) { return std::find(ids.begin(), ids.end(), id) != ids.end(); }
 
+/// Where the parameters of a law stand.
+Eigen::VectorXd values_of(const JointProblem& joint, const Law& law, const std::string& id) {
+  Eigen::VectorXd values(static_cast<Eigen::Index>(law.parameters.size()));
+  for (const Unknown& u : joint.unknowns())
+    for (std::size_t k = 0; k < law.parameters.size(); ++k)
+      if (joint.parameter(u).name == id + "." + law.parameters[k].name) values[static_cast<Eigen::Index>(k)] = u.value;
+  return values;
+}
+
 /// Whether there is a mismatch in the decays, of which the states that they ask for can tell.
 bool shows_in_decays(const Trial& base) { return has_decays(base.arrival.joint) && left_of_decays(base) > explained; }
+
+/// Where the search for the parameters of a form begins: at the coefficient, and where it is seen decisively at the shape, that the free decays ask for; otherwise at the shape at which it stands.
+Eigen::VectorXd start_of(Form form, const BesideUnknownForces& beside) {
+  const Screened here = screen({form}, beside).front();
+  const Eigen::VectorXd start = here.gain > 0 ? here.start : form.starts.front();
+  form.starts = shapes_of(form, Grid::fine);
+  const Screened best = screen({form}, beside).front();
+  return best.gain > decisive ? best.start : start;
+}
 
 }  // namespace
 
 LawSearch::LawSearch(FitProblem& problem, const Trial& base, std::function<bool(const Trial&)> leaves_something, Listed listed)
     : problem_(problem), base_(base), leaves_something_(std::move(leaves_something)), listed_(listed) {}
 
-/// Ids of the forms that explain most, which the rig gets.
+/// Ids of the forms that promise most to first order, which the rig gets.
 std::vector<std::string> LawSearch::forms_worth_a_fit(const Trial& base) {
-  const bool by_decays = shows_in_decays(base);
   const BesideUnknownForces beside = beside_unknown_forces(base.arrival.joint);
-  const std::vector<Form> forms = dictionary(problem_.rig, reach_of(beside));
-  std::vector<Screened> screened(forms.size());
-  if (by_decays) screened = screen(forms, beside);
+  std::vector<Form> forms = dictionary(problem_.rig, reach_of(beside));
+  std::vector<std::shared_ptr<const Effect>> at_work = base.arrival.joint.model().rig().laws;  // the rig may have got others since
+  std::erase_if(at_work, [&](const auto& law) { return !is_among(base.effects, law->id); });
+  problem_.rig.laws = at_work;
+  std::vector<std::string> ids;
+  for (Form& form : forms) {
+    form.starts = shapes_of(form, Grid::coarse);
+    const std::shared_ptr<const Effect> law = as_effect(form);
+    ids.push_back(law->id);
+    if (!is_among(base.effects, law->id)) problem_.rig.laws.push_back(law);
+  }
+  const Screening screening(problem_, base.arrival);
+  std::vector<double> promise(forms.size(), -INFINITY);
+  in_parallel(forms.size(), [&](std::size_t i) {
+    if (is_among(base.effects, ids[i])) return;
+    std::vector<std::string> set = base.effects;
+    set.push_back(ids[i]);
+    const Trial trial = screened(problem_, screening, base, set);
+    promise[i] = trial.score;
+    forms[i].starts = {values_of(trial.arrival.joint, forms[i].law, ids[i])};
+  });
   std::vector<std::size_t> order;
   for (std::size_t i = 0; i < forms.size(); ++i)
-    if (by_decays ? screened[i].gain > 0 : forms[i].law.acts_on == ActsOn::lift) order.push_back(i);
-  sort_by(order, [&](std::size_t i) { return -screened[i].gain; });
+    if (promise[i] > 0) order.push_back(i);
+  sort_by(order, [&](std::size_t i) { return -promise[i]; });
   if (order.size() > most_in_full) order.resize(most_in_full);
-  std::erase_if(order, [&](std::size_t i) { return screened[i].gain < half_of_it * screened[order.front()].gain; });
+  std::erase_if(order, [&](std::size_t i) { return promise[i] < half_of_it * promise[order.front()]; });
 
-  problem_.rig.laws = base.arrival.joint.model().rig().laws;  // the rig may have got others since
-  std::erase_if(problem_.rig.laws, [&](const auto& law) { return !is_among(base.effects, law->id); });
-  std::vector<std::string> ids;
+  problem_.rig.laws = at_work;
+  std::vector<std::string> worth_it;
   for (const std::size_t i : order) {
     Form form = forms[i];
-    if (by_decays) form.starts = {screened[i].start};
-    const std::shared_ptr<const Effect> law = as_effect(form);
-    if (is_among(base.effects, law->id)) continue;
-    problem_.rig.laws.push_back(law);
-    ids.push_back(law->id);
+    if (shows_in_decays(base)) form.starts = {start_of(form, beside)};
+    problem_.rig.laws.push_back(as_effect(form));
+    worth_it.push_back(ids[i]);
   }
-  return ids;
+  return worth_it;
 }
 
-/// Effects of the list that may be at work beside `base`; of those that are tried only where they are named the ones that are of the kind of a form.
-std::vector<std::string> LawSearch::of_the_list(const std::vector<std::string>& forms, const Trial& base) const {
+/// Effects of the list that may be at work beside `base`: those that are tried only where they are named and are of the kind of a form, or all others.
+std::vector<std::string> LawSearch::of_the_list(const Trial& base, const std::vector<std::string>& forms) const {
   std::vector<std::string> kinds;
   for (const std::string& id : forms) kinds.push_back(effect(problem_.rig, id).kind);
   std::vector<Conditions> conditions;
   for (const RunResidual& run : base.arrival.joint.runs()) conditions.push_back(run.conditions());
   std::vector<std::string> ids;
   for (const Effect& e : effects()) {
-    const bool wanted = e.only_if_named.empty() ? listed_ == Listed::all : is_among(kinds, e.kind);
+    const bool wanted = forms.empty() ? e.only_if_named.empty() : !e.only_if_named.empty() && is_among(kinds, e.kind);
     if (wanted && !is_among(base.effects, e.id) && why_idle(e, problem_.rig, conditions).empty()) ids.push_back(e.id);
   }
   return ids;
 }
 
-/// Laws of the list and of the dictionary. Before anything else was tried: where one of them promises most of all effects to first order those of the list that promise half as much, and forms where one of them does.
-LawSearch::Prospects LawSearch::prospects(const Trial& base) {
-  if (problem_.progress) problem_.progress("looking for the law of what is missing" + (base.effects.empty() ? std::string() : " beside " + base.effects.back()));
-  const std::vector<std::string> forms = forms_worth_a_fit(base);
-  std::vector<std::string> added = of_the_list(forms, base);
-  const std::size_t first_form = added.size();
-  added.insert(added.end(), forms.begin(), forms.end());
+/// Those of `ids` that are worth a fit beside `base`: laws that promise half of what the best of all promises, and none where a signal promises more than any law. `known`: what was asked about before.
+LawSearch::Prospects LawSearch::prospects(const Trial& base, const std::vector<std::string>& ids, const Promised& known) const {
   const Screening screening(problem_, base.arrival);
-  std::vector<std::optional<Trial>> trials(added.size());
-  in_parallel(trials.size(), [&](std::size_t i) {
+  std::vector<std::optional<Trial>> trials(ids.size());
+  std::vector<char> is_law(ids.size());
+  in_parallel(ids.size(), [&](std::size_t i) {
     std::vector<std::string> set = base.effects;
-    set.push_back(added[i]);
+    set.push_back(ids[i]);
     trials[i] = screened(problem_, screening, base, set);
+    is_law[i] = brings_a_law(*trials[i]);
   });
-  double best = 0, best_law = 0, best_form = 0;
-  for (std::size_t i = 0; i < trials.size(); ++i) {
-    best = std::max(best, trials[i]->score);
-    if (brings_a_law(*trials[i])) best_law = std::max(best_law, trials[i]->score);
-    if (i >= first_form) best_form = std::max(best_form, trials[i]->score);
+  Prospects found{{}, known};
+  for (std::size_t i = 0; i < ids.size(); ++i) {
+    double& most = is_law[i] ? found.promised.by_a_law : found.promised.by_a_signal;
+    most = std::max(most, trials[i]->score);
   }
-  if (listed_ == Listed::all && best_law < best) return {};
-  Prospects all;
-  for (std::size_t i = 0; i < trials.size(); ++i) {
-    const bool is_form = i >= first_form;
-    const bool worth_it = listed_ == Listed::only_if_named || ((is_form ? best_form : trials[i]->score) >= half_of_it * best && brings_a_law(*trials[i]));
-    if (worth_it) (is_form ? all.forms : all.listed).push_back(std::move(*trials[i]));
-  }
-  return all;
+  const bool all = listed_ == Listed::only_if_named, any = found.promised.by_a_law >= found.promised.by_a_signal;
+  for (std::size_t i = 0; i < ids.size(); ++i)
+    if (all || (any && is_law[i] && trials[i]->score >= half_of_it * found.promised.by_a_law)) found.laws.push_back(std::move(*trials[i]));
+  return found;
 }
 
 /// Fitted in full, those that are worth it.
@@ -151,27 +175,43 @@ bool LawSearch::may_have_rivals(const std::vector<Trial>& tried) const {
 }
 
 std::vector<Trial> LawSearch::search() {
-  Prospects alone = prospects(base_);
-  std::vector<Trial> all = followed(std::move(alone.listed), base_);
-  const auto add = [&](std::vector<Trial> more) { std::move(more.begin(), more.end(), std::back_inserter(all)); };
-  if (listed_ == Listed::all && goes_on(all) && all.front().excess() < half_of_it * base_.excess()) {
-    const Trial first = all.front();
-    add(followed(prospects(first).listed, first));
-  }
-  if (may_have_rivals(all)) {
-    add(followed(std::move(alone.forms), base_));
+  const auto tell = [&](const Trial& base) {
+    if (problem_.progress) problem_.progress("looking for the law of what is missing" + (base.effects.empty() ? std::string() : " beside " + base.effects.back()));
+  };
+  std::vector<Trial> all;
+  const auto follow = [&](Prospects asked, const Trial& base) {
+    std::vector<Trial> fitted = followed(std::move(asked.laws), base);
+    std::move(fitted.begin(), fitted.end(), std::back_inserter(all));
     sort_by(all, [&](const Trial& t) { return bic_difference(t, base_); });
-    if (goes_on(all)) {
+  };
+  const auto with_forms = [&](const Trial& base, std::vector<std::string> ids) {
+    const std::vector<std::string> forms = forms_worth_a_fit(base), rare = of_the_list(base, forms);
+    if (!forms.empty()) ids.insert(ids.end(), rare.begin(), rare.end());
+    ids.insert(ids.end(), forms.begin(), forms.end());
+    return ids;
+  };
+  tell(base_);
+  Promised promised;
+  if (listed_ == Listed::all) {
+    Prospects listed = prospects(base_, of_the_list(base_, {}), {});
+    promised = listed.promised;
+    follow(std::move(listed), base_);
+    if (goes_on(all) && all.front().excess() < half_of_it * base_.excess()) {
       const Trial first = all.front();
-      Prospects pairs = prospects(first);
-      std::move(pairs.forms.begin(), pairs.forms.end(), std::back_inserter(pairs.listed));
-      add(followed(std::move(pairs.listed), first));
+      follow(prospects(first, of_the_list(first, {}), {}), first);
     }
   }
-  sort_by(all, [&](const Trial& t) { return bic_difference(t, base_); });
+  if (may_have_rivals(all)) {
+    follow(prospects(base_, with_forms(base_, {}), promised), base_);
+    if (goes_on(all)) {
+      const Trial first = all.front();
+      tell(first);
+      follow(prospects(first, with_forms(first, listed_ == Listed::all ? of_the_list(first, {}) : std::vector<std::string>()), {}), first);
+    }
+  }
   if (!all.empty() && all.front().effects.size() > 1) {
     problem_.rig.laws = all.front().arrival.joint.model().rig().laws;
-    add(taken_away(problem_, all.front()));
+    for (Trial& fewer : taken_away(problem_, all.front())) all.push_back(std::move(fewer));
   }
   in_parallel(all.size(), [&](std::size_t i) {  // rivals are told apart by less than where a search among many ends
     if (!leaves_nothing(all[i]) && i > 0) return;

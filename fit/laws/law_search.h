@@ -11,14 +11,14 @@ namespace unrig {
 
 /// The law of a force that no effect on the list explains.
 ///
-/// 1. States that the free decays ask for, beside unknown accelerations (beside_unknown_forces).
-/// 2. Every form of the dictionary, its force on these states sent through the rig onto the readings (screen).
-/// 3. The forms that explain most are fitted with all their parameters free: to the free decays first, then to all runs; runs that are driven from first guesses. Effects of the list that are tried only where they are
-///    named are fitted too where a form of their kind is. All are held against each other by BIC.
-/// 4. Where the best leaves something, a second law is looked for beside it.
+/// 1. Every form of the dictionary at several shapes, its force sent through the rig onto the readings beside all unknowns of the fit (Screening): the share of chi-square that it promises to first order.
+/// 2. The coefficients of those that promise most, from states that the free decays ask for beside unknown accelerations (beside_unknown_forces, screen).
+/// 3. These are fitted with all their parameters free: to the free decays first, then to all runs; runs that are driven from first guesses. Effects of the list that are tried only where they are named are fitted too
+///    where a form of their kind is. All are held against each other by BIC.
+/// 4. Where the best leaves something, a second law is looked for beside it, and what that makes superfluous is taken away.
 ///
-/// Before anything else was tried (Listed::all) laws are looked for where one of them promises most of all effects, signals included, to first order (Screening), and only what promises half as much: laws of the list, one
-/// and a second beside it, and forms, which are their rivals.
+/// Before anything else was tried (Listed::all) laws are looked for where one of them promises most of all effects, signals included, to first order, and only what promises half as much: laws of the list, one and a second
+/// beside it, and forms, which are their rivals.
 ///
 /// Source: M. Alvarez, D. Luengo and N. Lawrence, Latent force models, AISTATS (2009); S. L. Brunton, J. L. Proctor and J. N. Kutz, PNAS 113 (2016) 3932, whose candidates are regressed on derivatives, here on readings.
 class LawSearch {
@@ -33,13 +33,18 @@ class LawSearch {
   std::vector<Trial> search();
 
  private:
+  /// Largest share of chi-square that was promised to first order.
+  struct Promised {
+    double by_a_law = 0, by_a_signal = 0;
+  };
   /// Sets with one law more, as they are to be fitted.
   struct Prospects {
-    std::vector<Trial> listed, forms;
+    std::vector<Trial> laws;
+    Promised promised;
   };
-  Prospects prospects(const Trial& base);
+  Prospects prospects(const Trial& base, const std::vector<std::string>& ids, const Promised& known) const;
   std::vector<std::string> forms_worth_a_fit(const Trial& base);
-  std::vector<std::string> of_the_list(const std::vector<std::string>& forms, const Trial& base) const;
+  std::vector<std::string> of_the_list(const Trial& base, const std::vector<std::string>& forms) const;
   std::vector<Trial> followed(std::vector<Trial> tried, const Trial& base) const;
   bool goes_on(const std::vector<Trial>& tried) const;
   bool may_have_rivals(const std::vector<Trial>& tried) const;

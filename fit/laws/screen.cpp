@@ -28,42 +28,12 @@ struct Column {
   std::vector<Index> coefficients;
 };
 
-/// Parameters in which the force is linear: coefficients of the dictionary are called c, c2 ... , f and k.
-std::vector<Index> coefficients_of(const Law& law) {
-  std::vector<Index> found;
-  for (std::size_t k = 0; k < law.parameters.size(); ++k)
-    if (const char c = law.parameters[k].name.front(); c == 'c' || c == 'f' || c == 'k') found.push_back(static_cast<Index>(k));
-  return found;
-}
-
-/// Shapes of a form: those of its starts, and exponents, corners and times around them.
+/// The shapes at which forms stand.
 std::vector<Column> shapes_of(const std::vector<Form>& forms, ActsOn place) {
   std::vector<Column> all;
-  for (std::size_t f = 0; f < forms.size(); ++f) {
-    const Law& law = forms[f].law;
-    if (law.acts_on != place) continue;
-    std::vector<VectorXd> shapes{forms[f].starts.front()};
-    const std::vector<Index> linear = coefficients_of(law);
-    for (std::size_t k = 0; k < law.parameters.size(); ++k) {
-      if (std::find(linear.begin(), linear.end(), static_cast<Index>(k)) != linear.end()) continue;
-      const Parameter& p = law.parameters[k];
-      std::vector<double> values;
-      if (law.memory && p.name == "n") continue;  // of hysteresis the corner and the loop's shape
-      if (p.name == "p") values = {0.5, 1.5, 2, 2.5, 3, 4, 5};
-      else if (law.memory && p.name == "b") values = {-0.6, -0.3, 0, 0.5};
-      else
-        for (const double factor : {0.2, 0.5, 1.0, 2.0, 4.0}) values.push_back(factor * shapes.front()[static_cast<Index>(k)]);
-      std::vector<VectorXd> each;
-      for (const double value : values)
-        if (value >= p.lower && value <= p.upper)
-          for (VectorXd shape : shapes) {
-            shape[static_cast<Index>(k)] = value;
-            each.push_back(std::move(shape));
-          }
-      shapes = std::move(each);
-    }
-    for (VectorXd& shape : shapes) all.push_back({f, std::move(shape), linear});
-  }
+  for (std::size_t f = 0; f < forms.size(); ++f)
+    if (forms[f].law.acts_on == place)
+      for (const VectorXd& shape : forms[f].starts) all.push_back({f, shape, coefficients_of(forms[f].law)});
   return all;
 }
 

@@ -9,7 +9,7 @@ namespace unrig {
 
 /// How well a form explains free decays beside a linear rig whose stiffness, damping and mass may change.
 struct Screened {
-  Eigen::VectorXd start;  ///< parameters of the form; its coefficient estimated, its shape the best of a grid
+  Eigen::VectorXd start;  ///< parameters of the form; its coefficient estimated, its shape the best of its starts
   double deviance = 0;    ///< -2 ln likelihood of the decays, but for a constant
   double gain = 0;        ///< twice the log likelihood beyond that without a law; 0 where the form was not looked at, or its coefficient lies where it may not be
 };

@@ -126,7 +126,7 @@ JointProblem Screening::best_start(const JointProblem& joint, const std::string&
     return best;
   }
   const bool with_motions = std::any_of(joint.runs().begin(), joint.runs().end(), [](const RunResidual& run) { return run.motion().unknowns() > 0; });
-  if (with_motions && is_law(joint, id) && judge().first_order.known()) {
+  if ((with_motions || is_law_id(id)) && is_law(joint, id) && judge().first_order.known()) {
     double most = -INFINITY;
     VectorXd chosen = starts.front();
     for (const VectorXd& start : starts) {

@@ -143,7 +143,8 @@ TEST(Screen, PutsTheTruthFirstOrSecond) {
     const Reach reach = reach_of(beside);
     EXPECT_NEAR(reach.x, 1, 0.2) << truth.law;
     EXPECT_NEAR(reach.v, omega, 0.2 * omega) << truth.law;
-    const std::vector<Form> forms = dictionary(problem.rig, reach);
+    std::vector<Form> forms = dictionary(problem.rig, reach);
+    for (Form& form : forms) form.starts = shapes_of(form, Grid::fine);
     const std::vector<Screened> screened = screen(forms, beside);
     std::size_t better = 0;
     double own = 0;
