@@ -121,7 +121,8 @@ struct Diagnosis {
 ///    own variance and with as many samples as the remaining colour leaves independent.
 /// 4. While a mismatch remains a further effect is tried beside the best; an effect that others made superfluous is taken away again.
 /// 5. Where the rig's description leaves nothing, effects are named only if their evidence beats it decisively. Where it leaves something and effects do so too, effects are tried beside it.
-/// 6. Where something remains all the same, its law is looked for (fit/laws/law_search.h), from the fit with nothing missing, else beside the best set.
+/// 6. Laws, of the list and of no list, are looked for (fit/laws/law_search.h) before step 2 where one of them promises most of all effects, and otherwise where something remains all the same, from the fit with nothing
+///    missing, else beside the best set.
 /// An effect is named only where no significant mismatch remains beside the set it belongs to, or nearly all of the excess is gone (which is not enough for signals
 /// with amplitudes of their own in every run), and where runs that were not fitted are predicted better with it than without: those held out or, where there are
 /// none, each fitted run from the others. Otherwise the mismatch is unexplained, and the force is given that would explain it.
