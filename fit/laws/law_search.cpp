@@ -147,7 +147,7 @@ std::vector<Trial> LawSearch::followed(std::vector<Trial> tried, const Trial& ba
   in_parallel(tried.size(), [&](std::size_t i) {
     hold_undetermined(tried[i]);
     if (driven) follow_nonlinear(problem_, tried[i], base, INFINITY);
-    else if (by_decays && nonlinear(tried[i])) tried[i].ruled_out = !fit_decays_first(tried[i], base, true);
+    else if (nonlinear(tried[i])) tried[i].ruled_out = !fit_decays_first(tried[i], base, by_decays);
   });
   // Of thousands of samples twice the excess of another is beyond any evidence.
   const auto excess = [](const Trial& t) { return std::max(0.0, left_of_decays(t) - 1); };

@@ -339,7 +339,7 @@ namespace {
 void follow_motions(Trial& trial) {
   JointProblem& joint = trial.arrival.joint;
   const auto moves = [](const RunResidual& run) { return run.motion().unknowns() > 0; };
-  if (std::none_of(joint.runs().begin(), joint.runs().end(), moves)) return;
+  if (std::none_of(joint.runs().begin(), joint.runs().end(), moves)) return measure(trial);
   for (RunResidual& run : joint.runs()) run.set_aside(!trial.decays.exactly && !moves(run));
   fit_own_parameters(joint);
   temper(joint);

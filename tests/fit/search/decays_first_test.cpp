@@ -149,5 +149,17 @@ TEST(DecaysFirst, AFitWithAStrongSpringNamedArrives) {
   }
 }
 
+/// What is not measured would rank before all that is.
+TEST(DecaysFirst, DecaysAloneUnderAGapAreMeasured) {
+  FitProblem problem;
+  problem.rig = read_rig(test::null_campaign("rig.toml"));
+  for (const std::string name : {"dry_pluck.csv", "wet_pluck.csv"}) problem.runs.push_back(read_run(test::null_campaign(name)));
+  const Trial base = fit_baseline(problem);
+  Trial gap = prepare(problem, base, {"freeplay"});
+  ASSERT_TRUE(decays_decide(gap));
+  follow_further(gap, INFINITY);
+  EXPECT_EQ(gap.variance.size(), problem.runs.size());
+}
+
 }  // namespace
 }  // namespace unrig
