@@ -94,7 +94,7 @@ double white_variance(const DecayModel& model, double chi2, std::size_t poles) {
 }
 
 // While searching, a fit need only be good enough to show what it leaves over.
-constexpr double search_precision = 0.3;  // standard errors
+constexpr double search_precision = 0.3;  // standard errors: chi-square is within 0.1 of its least, and tens decide
 constexpr int search_iterations = 8;
 
 /// Takes up poles while the record asks for them. Returns false where `most` did not suffice.

@@ -353,7 +353,7 @@ Diagnosis diagnose_in_order(const DiagnoseProblem& problem, bool numbers_known) 
     return true;
   };
   Trial best_set = baseline;
-  // A law shows in the force that is missing, in a second: where one leaves nothing, no set of effects is looked for. Where all runs are driven each law costs a search from first guesses.
+  // A law shows in what it promises to first order, in seconds: where one leaves nothing, no set of effects is looked for. Where all runs are driven each law costs a search from first guesses.
   const bool may_find_laws = problem.laws && !problem.verdict_only && problem.effects.empty() && d.mismatch.found;
   const bool described_already = description && description->left < explained;
   std::vector<Trial> laws_tried;

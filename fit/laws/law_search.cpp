@@ -37,9 +37,10 @@ void sort_by(std::vector<T>& all, Key key) {
 
 bool is_among(const std::vector<std::string>& ids, const std::string& id) { return std::find(ids.begin(), ids.end(), id) != ids.end(); }
 
-/// Where the parameters of a law stand.
-Eigen::VectorXd values_of(const JointProblem& joint, const Law& law, const std::string& id) {
-  Eigen::VectorXd values(static_cast<Eigen::Index>(law.parameters.size()));
+/// Where the parameters of a form stand; those that no run asks for at its first start.
+Eigen::VectorXd values_of(const JointProblem& joint, const Form& form, const std::string& id) {
+  const Law& law = form.law;
+  Eigen::VectorXd values = form.starts.front();
   for (const Unknown& u : joint.unknowns())
     for (std::size_t k = 0; k < law.parameters.size(); ++k)
       if (joint.parameter(u).name == id + "." + law.parameters[k].name) values[static_cast<Eigen::Index>(k)] = u.value;
@@ -85,7 +86,7 @@ std::vector<std::string> LawSearch::forms_worth_a_fit(const Trial& base) {
     set.push_back(ids[i]);
     const Trial trial = screened(problem_, screening, base, set);
     promise[i] = trial.score;
-    forms[i].starts = {values_of(trial.arrival.joint, forms[i].law, ids[i])};
+    forms[i].starts = {values_of(trial.arrival.joint, forms[i], ids[i])};
   });
   std::vector<std::size_t> order;
   for (std::size_t i = 0; i < forms.size(); ++i)

@@ -135,6 +135,16 @@ TEST(LawSearch, FindsNothingInANonlinearDecayThatIsNone) {
   EXPECT_FALSE(d.unexplained);
 }
 
+/// A rig gets other laws while they are tried; the one beside which a second is looked for stays at work.
+TEST(LawSearch, FindsTheLawAtWorkInTheFitAndNotInTheRig) {
+  FitProblem problem = two_decays(hidden.front().force);
+  const Trial base = fit_baseline(problem);
+  const auto leaves_something = [](const Trial& t) { return what_remains(t).found; };
+  const Trial with = LawSearch(problem, base, leaves_something, LawSearch::Listed::only_if_named).search().front();
+  problem.rig.laws.clear();
+  for (const Trial& t : LawSearch(problem, with, leaves_something, LawSearch::Listed::only_if_named).search()) EXPECT_EQ(t.effects.front(), with.effects.front());
+}
+
 TEST(Screen, PutsTheTruthFirstOrSecond) {
   for (const Hidden& truth : hidden) {
     FitProblem problem = two_decays(truth.force);
