@@ -49,8 +49,6 @@ Effect bouc_wen() {
     return Eigen::Vector4d(p[0] * release, p[1] * deflection, p[2], 1);
   };
   e.states = [](const AeroelasticModel&, const Conditions&) -> Eigen::Index { return 1; };
-  // By name it is found (tests/fit/hysteresis_test.cpp); how often it is named falsely on campaigns is not counted.
-  e.only_if_named = "how often it would be named falsely is not known";
   e.acts = [](const Rig&, const Conditions&) { return true; };
   e.apply = [](LinearSystem& system, const EffectContext& c) {
     const Eigen::RowVectorXd shape = first_mode(c.model, system.coordinates);

@@ -32,8 +32,6 @@ Effect cubic_damping() {
     const double fastest = release / first_mode_momentum(model);
     return Eigen::VectorXd::Constant(1, log_between(random, 1e-3, 0.3) * release / (fastest * fastest * fastest));
   };
-  // Seen in the roll of a ship; how often on campaigns is not counted.
-  e.only_if_named = "it passes for quadratic drag";
   e.acts = [](const Rig&, const Conditions&) { return true; };
   e.apply = [](LinearSystem& system, const EffectContext& c) {
     const Eigen::RowVectorXd shape = first_mode(c.model, system.coordinates);

@@ -85,8 +85,6 @@ struct Effect {
   bool enriches_basis = false;  ///< on a beam its model has all modes below the Nyquist frequency, in place of the number in the rig file
   bool in_the_load = false;     ///< it changes the load that a rigid rig would feel, which `correct` must not take out
   Needs needs = Needs::any_rig;
-  /// Why `unrig diagnose` tries it only where it is named; empty: wherever it acts.
-  std::string only_if_named = {};
   /// Whether, with these parameters of the model, it is something of its own beside what the model has without it and beside other effects, in records of so many seconds. None: it always is.
   std::function<bool(const AeroelasticModel&, const Eigen::VectorXd& theta, double seconds)> distinct = {};
 };

@@ -33,7 +33,7 @@ namespace {
 
 using Eigen::Index;
 
-constexpr double twice_the_noise = 2;
+constexpr double twice_the_noise = 2, half_of_it = 0.5;
 
 /// The time that a diagnosis may take, over the parts of it that search [s of the processor]; 0: any.
 class SearchTime {
@@ -191,14 +191,6 @@ void describe_numbers(const DiagnoseProblem& problem, const std::vector<FittedGi
   fit.warnings.push_back("the numbers that state their uncertainty stand at what the fit with nothing missing made of them; standard errors are those with these numbers known");
 }
 
-/// Whether noise of a colour, at rest, explains all that a fit leaves; if so, the fit is in that noise from then on.
-bool explained_by_noise(Trial& trial) {
-  Trial coloured = trial;
-  if (!take_noise_colour(coloured) || what_remains(coloured).found) return false;
-  trial = std::move(coloured);
-  return true;
-}
-
 /// BIC of the readings, comparable between noises: -2 ln likelihood with each run's own variance, n ln(variance) - 2 ln(density of the noise where all innovations are 0), plus ln(samples) per variable. The states of a
 /// whitening filter are among the variables, as many as its noise has powers.
 double bic_in_its_noise(const Trial& trial) {
@@ -216,8 +208,7 @@ double bic_in_its_noise(const Trial& trial) {
 /// The effects that are to be tried, without those that wander: in white noise such a force takes the colour of those runs in which it acts for its own, and of noise that explains all runs none is left for it.
 DiagnoseProblem without_wandering(DiagnoseProblem problem) {
   if (problem.effects.empty())
-    for (const Effect& e : effects())
-      if (e.only_if_named.empty()) problem.effects.push_back(e.id);
+    for (const Effect& e : effects()) problem.effects.push_back(e.id);
   std::erase_if(problem.effects, [&](const std::string& id) { return effect(problem.rig, id).noise != nullptr; });
   return problem;
 }
@@ -227,6 +218,7 @@ bool effects_beat_noise(const DiagnoseProblem& problem, const FitProblem& fit_pr
   const DiagnoseProblem steady = without_wandering(problem);
   if (steady.effects.empty()) return false;
   Selection selection(steady, fit_problem, white);
+  selection.hold_laws_against(1 - coloured.reduced_chi2() / white.reduced_chi2());
   const Trial best = selection.best_set();
   return !best.effects.empty() && !what_remains(best).found && bic_in_its_noise(best) - bic_in_its_noise(coloured) < -decisive;
 }
@@ -329,9 +321,11 @@ Diagnosis diagnose_in_order(const DiagnoseProblem& problem, bool numbers_known) 
   if (coloured) d.mismatch = locate_mismatch(baseline.arrival.joint);
   std::optional<RigDescription> description;
   if (d.mismatch.found && !numbers_known) time.spend([&] { description = describe_rig(problem, baseline); });
+  const bool described_already = description && description->left < explained;
   // What a set leaves may be noise that is not white, in which all is to be held against each other anew, or the rig's description.
   const Setting files{&fit_problem, &problem.heldout};
   auto selection = std::make_unique<Selection>(problem, fit_problem, baseline);
+  if (described_already) selection->hold_laws_against(1 - description->trial.reduced_chi2() / baseline.reduced_chi2());
   bool anew = false, asked = numbers_known;
   std::optional<FoundSet> beside;  // the rig's description and laws
   const auto noise_or_rig = [&](const Trial& set) {
@@ -341,7 +335,7 @@ Diagnosis diagnose_in_order(const DiagnoseProblem& problem, bool numbers_known) 
       baseline = std::move(in_its_noise);
       return coloured = anew = true;
     }
-    if (asked || (description && description->left < explained)) return false;
+    if (asked || described_already) return false;
     std::optional<RigDescription> rig = describe_rig(problem, set, enough_to_name);
     if (!rig || rig->left > explained) return false;
     asked = true;
@@ -353,16 +347,15 @@ Diagnosis diagnose_in_order(const DiagnoseProblem& problem, bool numbers_known) 
     return true;
   };
   Trial best_set = baseline;
-  // A law shows in what it promises to first order, in seconds: where one leaves nothing, no set of effects is looked for. Where all runs are driven each law costs a search from first guesses.
-  const bool may_find_laws = problem.laws && !problem.verdict_only && problem.effects.empty() && d.mismatch.found;
-  const bool described_already = description && description->left < explained;
+  // A law shows in what it promises to first order, in seconds: where one leaves nothing, no set of effects is looked for.
+  const bool may_find_laws = problem.laws && problem.effects.empty() && d.mismatch.found;
   std::vector<Trial> laws_tried;
   std::optional<Laws> laws;
   FoundSet found = look_at(problem, files, baseline, files, baseline, 0);
-  if (may_find_laws && !described_already && !all_driven(baseline.arrival.joint))
+  if (may_find_laws && !described_already)
     time.spend([&] {
       tell("looking for a law in the force that is missing");
-      laws_tried = search_laws(fit_problem, baseline, baseline, LawSearch::Listed::all, *selection);
+      laws_tried = search_laws(fit_problem, baseline, baseline, LawSearch::Among::laws_and_forms, *selection);
       if (none_leaves_nothing(laws_tried) && !laws_tried.empty() && !coloured)
         if (Trial in_its_noise = laws_tried.front(); explained_by_noise(in_its_noise)) {  // all is held against each other anew
           take_noise_of(baseline, in_its_noise);
@@ -370,12 +363,16 @@ Diagnosis diagnose_in_order(const DiagnoseProblem& problem, bool numbers_known) 
           d.mismatch = locate_mismatch(baseline.arrival.joint);
           selection = std::make_unique<Selection>(problem, fit_problem, baseline);
           found = look_at(problem, files, baseline, files, baseline, 0);
-          laws_tried = search_laws(fit_problem, baseline, baseline, LawSearch::Listed::all, *selection);
+          laws_tried = search_laws(fit_problem, baseline, baseline, LawSearch::Among::laws_and_forms, *selection);
         }
       if (!none_leaves_nothing(laws_tried)) laws = choose_law(problem, fit_problem, files, baseline, laws_tried, *selection, found);
     });
   if (!laws) fit_problem.rig.laws.clear();
-  if (!laws) time.spend([&] { best_set = selection->best_set(noise_or_rig); });
+  // Laws of the list that take most of the mismatch are where the search among all effects goes on from.
+  const auto is_begun = [&](const Trial& t) { return std::none_of(t.effects.begin(), t.effects.end(), is_law_id) && t.excess() < half_of_it * baseline.excess() && bic_difference(t, baseline) < -decisive; };
+  std::optional<Trial> begun;
+  if (const auto first = std::find_if(laws_tried.begin(), laws_tried.end(), is_begun); first != laws_tried.end()) begun = *first;
+  if (!laws) time.spend([&] { best_set = selection->best_set(noise_or_rig, begun ? &*begun : nullptr); });
   if (anew) {
     tell("trying what may be missing, in noise of the colour that is left");
     d.mismatch = locate_mismatch(baseline.arrival.joint);
@@ -396,11 +393,12 @@ Diagnosis diagnose_in_order(const DiagnoseProblem& problem, bool numbers_known) 
     time.spend([&] {
       tell("looking for the law of what is missing");
       const auto add_beside = [&](const Trial& base) {
-        for (Trial& t : search_laws(fit_problem, baseline, base, LawSearch::Listed::only_if_named, *selection)) laws_tried.push_back(std::move(t));
+        for (Trial& t : search_laws(fit_problem, baseline, base, LawSearch::Among::forms, *selection)) laws_tried.push_back(std::move(t));
       };
-      const bool forms_were_fitted = std::any_of(laws_tried.begin(), laws_tried.end(), [](const Trial& t) { return is_law_id(t.effects.back()); });
-      if (!forms_were_fitted) add_beside(baseline);
-      if (!found.best.effects.empty()) add_beside(found.best);
+      // Forms are held against laws of the list before, and beside what takes most of the mismatch below.
+      if (laws_tried.empty() && found.best.excess() > half_of_it * baseline.excess()) add_beside(baseline);
+      const bool beside_it = begun && same_set(begun->effects, found.best.effects);  // laws were looked for before
+      if (!found.best.effects.empty() && !beside_it) add_beside(found.best);
       laws = choose_law(problem, fit_problem, files, baseline, laws_tried, *selection, found);
     });
   for (const Trial& t : laws_tried)
@@ -438,7 +436,7 @@ Diagnosis diagnose_in_order(const DiagnoseProblem& problem, bool numbers_known) 
     if (d.naming != Naming::named) d.removed_by_closest = 1 - best.excess() / baseline.excess();
     std::vector<MissingEffect>& set = d.naming == Naming::named ? d.missing : d.closest;
     for (MissingEffect& m : effects_of(found, fit_problem.rig, d)) set.push_back(std::move(m));
-    if (laws) tell_laws(fit_problem, *laws, found, set, d);
+    if (laws && !problem.verdict_only) tell_laws(fit_problem, *laws, found, set, d);
   }
   d.stopped = time.is_up();
   d.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();

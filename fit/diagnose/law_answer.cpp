@@ -13,6 +13,8 @@ namespace {
 
 bool leaves_something(const Trial& t) { return what_remains(t).found; }
 
+bool is_noise(Trial t) { return explained_by_noise(t); }
+
 /// Whether the runs determine no parameter of some member: what they then say is that something acts, not by which equation.
 bool is_undetermined(const FitProblem& problem, const Trial& set) {
   FitProblem with = problem;
@@ -31,8 +33,10 @@ bool is_undetermined(const FitProblem& problem, const Trial& set) {
 
 bool none_leaves_nothing(const std::vector<Trial>& tried) { return std::all_of(tried.begin(), tried.end(), leaves_something); }
 
-std::vector<Trial> search_laws(FitProblem& fit_problem, const Trial& baseline, const Trial& base, LawSearch::Listed listed, Selection& selection) {
-  std::vector<Trial> tried = LawSearch(fit_problem, base, leaves_something, listed).search();
+std::vector<Trial> search_laws(FitProblem& fit_problem, const Trial& baseline, const Trial& base, LawSearch::Among among, Selection& selection) {
+  LawSearch search(fit_problem, base, leaves_something, is_noise, among);
+  std::vector<Trial> tried = search.search();
+  if (base.effects.empty()) selection.rule_out(search.ruled_out());
   for (const Trial& t : tried) selection.add({t.effects, t.reduced_chi2(), bic_difference(t, baseline), 0, 0});
   return tried;
 }

@@ -18,7 +18,7 @@ struct Laws {
 bool none_leaves_nothing(const std::vector<Trial>& tried);
 
 /// Laws beside `base`, which the ranking gets.
-std::vector<Trial> search_laws(FitProblem& fit_problem, const Trial& baseline, const Trial& base, LawSearch::Listed listed, Selection& selection);
+std::vector<Trial> search_laws(FitProblem& fit_problem, const Trial& baseline, const Trial& base, LawSearch::Among among, Selection& selection);
 
 /// The law of what no effect explains: beside nothing, since an effect of the list may stand in for it, and beside the best set. A law that is on the list goes by its id: an effect of the list comes first where
 /// no form is decisively better. What leaves nothing comes before the rest: of sets that set decays aside the evidence is that of the other runs. Where the first is named, leaves nothing or is no worse than any

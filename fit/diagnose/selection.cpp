@@ -36,13 +36,18 @@ void fit_linear(Trials& trials) {
   in_parallel(std::min(trials.size(), most_in_full), [&](std::size_t i) { fit_fully(trials[i], 6); });
 }
 
-/// Those that were `fitted`: by the free decays first, the most promising effect first; none after one that leaves nothing of a mismatch too large for two laws to explain alike.
+/// Those that were `fitted`: laws by the free decays first, the most promising effect first; none after one that leaves nothing of a mismatch too large for two laws to explain alike.
 void fit_nonlinear(const FitProblem& problem, const Tell& tell, Trials& trials, const Trial& base, Trials& fitted) {
   double least = base.reduced_chi2();
   for (Trial& trial : trials) {
     if (tell) tell(fmt::format("trying {}", fmt::join(trial.effects, " with ")));
     hold_undetermined(trial);
-    follow_nonlinear(problem, trial, base, least);
+    if (brings_a_law(trial)) {
+      follow_nonlinear(problem, trial, base, least);
+    } else {
+      fit_fully(trial, 2);
+      if (trial.reduced_chi2() < least) fit_fully(trial, 6);
+    }
     least = std::min(least, trial.reduced_chi2());
     fitted.push_back(std::move(trial));
     if (leaves_nothing(fitted.back()) && base.reduced_chi2() >= nearly_explained) break;
@@ -103,16 +108,6 @@ void fit_others_anew(const FitProblem& problem, Trials& trials) {
   });
 }
 
-/// With a law at work that leaves something near the noise: the same followed in finer steps, where these leave less than half of it. What coarse steps make of a sharp law is no effect; where they are
-/// not what is missing, they would only make everything after it dearer.
-Trial in_finer_steps(Trial trial) {
-  constexpr Eigen::Index finer = 4;
-  if (trial.effects.empty() || !nonlinear(trial) || decays_decide(trial) || trial.reduced_chi2() > nearly_explained || trial.arrival.joint.runs().front().finer() >= finer) return trial;
-  Trial again = trial;
-  follow_finer(again, finer);
-  return again.excess() < 0.5 * trial.excess() ? again : trial;
-}
-
 }  // namespace
 
 bool same_set(Strings a, Strings b) {
@@ -135,6 +130,13 @@ Mismatch what_remains(const Trial& trial) {
   return mismatch;
 }
 
+bool explained_by_noise(Trial& trial) {
+  Trial coloured = trial;
+  if (!take_noise_colour(coloured) || what_remains(coloured).found) return false;
+  trial = std::move(coloured);
+  return true;
+}
+
 Selection::Selection(const DiagnoseProblem& problem, const FitProblem& fit_problem, const Trial& baseline) : problem_(problem), fit_problem_(fit_problem), baseline_(baseline) {
   ranking_.push_back({{}, baseline.reduced_chi2(), 0, 0, 0});
 }
@@ -149,7 +151,6 @@ Strings Selection::candidates(const Strings& at_work, const Strings& hopeless) c
     if (!problem_.effects.empty() && std::find(problem_.effects.begin(), problem_.effects.end(), e.id) == problem_.effects.end()) continue;
     if (std::find(at_work.begin(), at_work.end(), e.id) != at_work.end()) continue;
     if (std::find(hopeless.begin(), hopeless.end(), e.id) != hopeless.end()) continue;
-    if (problem_.effects.empty() && !e.only_if_named.empty()) continue;
     if (why_idle(e, problem_.rig, conditions).empty()) ids.push_back(e.id);
   }
   return ids;
@@ -171,8 +172,10 @@ Trials Selection::try_one_more(const Trial& base, const Strings& hopeless) {
   for (const auto& trial : prepared) {
     const bool promises_nothing = effect(trial->effects.back()).parameters_on(problem_.rig).empty();  // it may hold all the same
     const bool follows_law = nonlinear(*trial), far = base.reduced_chi2() > twice_the_noise;
-    const bool promises = linear.size() + others.size() < most_refits && (trial->score > 0.25 * best_score || (follows_law && far));
-    const bool step_says_nothing = far && brings_a_law(*trial);  // a law far from the truth
+    const bool steps_say_little = far && best_score < half_way;  // of laws far from the truth
+    const bool promises = linear.size() + others.size() < most_refits && (trial->score > 0.25 * best_score || (follows_law && steps_say_little));
+    const bool step_says_nothing = steps_say_little && brings_a_law(*trial);
+    if (brings_a_law(*trial) && ((!far && !may_be_seen(*trial, base)) || (is_first(base) && trial->score < half_way * taken_))) continue;
     if (prepared.size() <= few || promises_nothing || promises || step_says_nothing) (follows_law ? others : linear).push_back(std::move(*trial));
     else if (!follows_law) unpromising.push_back(std::move(*trial));
   }
@@ -249,6 +252,7 @@ Trials Selection::rivals(const Trial& best, const std::string& member) {
     if (is_fitted(set)) return;
     Trial trial = screened(fit_problem_, screening, others, set);
     if (brings_a_law(trial) && others.reduced_chi2() > nearly_explained) return;  // too large a mismatch for two laws to explain alike
+    if (brings_a_law(trial) && fewer.empty() && trial.score < half_way * taken_) return;
     if (without - (1 - trial.score) * now > half_way * (without - with_it)) prepared[i] = std::move(trial);
   });
   Trials rivals;
@@ -324,9 +328,16 @@ void Selection::take_known_lines(Trial& best) {
   if (!lines_.empty() && !what_remains(best).found) best = challenged(std::move(best));
 }
 
+/// Without what is superfluous, and held against what may explain the runs in place of its members.
+Trial Selection::settled(Trial trial) {
+  trial = without_superfluous(challenged(std::move(trial)));
+  judge_decays(trial);
+  return trial;
+}
+
 void Selection::grow(Trial& best, const std::function<bool(const Trial&)>& enough, std::optional<Trial>& sufficient) {
   if (best.reduced_chi2() > twice_the_noise) take_known_lines(best);
-  Strings hopeless;  // laws with which alone the fit is worse than without: from that far away they are not found, and are not tried again before half of the way is gone
+  Strings hopeless = ruled_out_;  // laws with which alone the fit is worse than without: from that far away they are not found, and are not tried again before half of the way is gone
   while (!stopped_ && best.effects.size() < most_effects && what_remains(best).found) {
     best = in_finer_steps(best);
     if (!what_remains(best).found) break;
@@ -343,11 +354,7 @@ void Selection::grow(Trial& best, const std::function<bool(const Trial&)>& enoug
     if (!(is_first(best) || plausible(next)) || bic_difference(next, best) > -decisive) break;
     if (next.excess() < half_way * best.excess()) hopeless.clear();
     best = next;
-    if (!stopped_) {
-      Trial settled = without_superfluous(challenged(without_superfluous(next)));
-      judge_decays(settled);
-      best = std::move(settled);
-    }
+    if (!stopped_) best = settled(without_superfluous(next));
     std::move(tried.begin(), tried.end(), std::back_inserter(tried_));
     if (!stopped_ && enough && what_remains(best).found && enough(best)) {
       sufficient.reset();
@@ -356,10 +363,12 @@ void Selection::grow(Trial& best, const std::function<bool(const Trial&)>& enoug
   }
 }
 
-Trial Selection::best_set(const std::function<bool(const Trial&)>& enough) {
-  Trial best = baseline_;
+Trial Selection::best_set(const std::function<bool(const Trial&)>& enough, const Trial* begun) {
+  Trial best = begun ? *begun : baseline_;
   std::optional<Trial> sufficient;  // a law that is followed all but exactly: what it leaves has a name only where that leaves nothing
   try {
+    if (begun) best = settled(std::move(best));
+    if (begun && enough && what_remains(best).found && enough(best)) return best;
     grow(best, enough, sufficient);
   } catch (const OutOfTime&) {
     stop();

@@ -12,6 +12,9 @@ namespace unrig {
 /// What a fit leaves (locate_mismatch); of decays that are set aside, what laws leave of them that are trusted to within some per cent.
 Mismatch what_remains(const Trial& trial);
 
+/// Whether noise of a colour, at rest, explains all that a fit leaves; if so, the fit is in that noise from then on.
+bool explained_by_noise(Trial& trial);
+
 /// Whether two sets have the same effects, in whichever order.
 bool same_set(std::vector<std::string> a, std::vector<std::string> b);
 
@@ -25,8 +28,14 @@ class Selection {
   /// Looks at all three as long as it lives.
   Selection(const DiagnoseProblem& problem, const FitProblem& fit_problem, const Trial& baseline);
 
-  /// `baseline` itself where no mismatch is found or no effect is worth it. It ends, too, with a set that leaves something where `enough` says so.
-  Trial best_set(const std::function<bool(const Trial&)>& enough = {});
+  /// `baseline` itself where no mismatch is found or no effect is worth it. It ends, too, with a set that leaves something where `enough` says so. `begun`: a set that was found elsewhere, from which it goes on.
+  Trial best_set(const std::function<bool(const Trial&)>& enough = {}, const Trial* begun = nullptr);
+
+  /// Something else takes this share of chi-square: a law that promises less than half of that does not come out ahead, and is not fitted.
+  void hold_laws_against(double share) { taken_ = share; }
+
+  /// Laws against which the free decays speak beside nothing.
+  void rule_out(std::vector<std::string> laws) { ruled_out_ = std::move(laws); }
 
   /// Whether the search ended because its time was up (core/numerics/time_limit.h), which is lifted then.
   bool stopped() const { return stopped_; }
@@ -38,6 +47,7 @@ class Selection {
   std::vector<Candidate> ranking() const;
 
  private:
+  Trial settled(Trial trial);
   void grow(Trial& best, const std::function<bool(const Trial&)>& enough, std::optional<Trial>& sufficient);
   void stop();
   void take_known_lines(Trial& best);
@@ -61,6 +71,8 @@ class Selection {
   std::vector<Candidate> ranking_;
   std::vector<std::string> lines_;  // signals at frequencies known beforehand that were taken out first
   bool stopped_ = false;
+  double taken_ = 0;
+  std::vector<std::string> ruled_out_;
 };
 
 /// Probabilities of a ranking (the best first) once `named` is the answer: a set of lower BIC that is neither named nor `unrefuted` leaves something or predicts worse, and so explains nothing.

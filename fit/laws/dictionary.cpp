@@ -32,6 +32,7 @@ struct Line {
   const char* memory;
   std::vector<FormParameter> parameters;
   std::vector<Symbol> scaled;
+  const char* listed = "";
 };
 
 constexpr double little = 0.02, more = 0.1;  // of the force that the runs reach: starts, between which a search finds its way
@@ -57,7 +58,7 @@ std::vector<Line> lines() {
       {"spring with the speed squared", ActsOn::normal, "-c * x * v^2", "", {either}, {x, v}},
       {"dry friction", ActsOn::normal, "-f * tanh(v / s)", "", {{"f", In::force, {little}, 0}, {"s", In::v, {0.02}, 1e-3, 2}}, {}},
       {"friction of Stribeck", ActsOn::normal, "-f * (1 + r * exp(-abs(v) / s)) * tanh(v / (0.1 * s))", "", {{"f", In::force, {little}, 0}, {"r", In::number, {0.3}, -1, 10}, {"s", In::v, {0.05}, 5e-3, 2}}, {}},
-      {"hysteresis of Bouc and Wen", ActsOn::normal, "-f * z", "v / xy * (1 - abs(z)^n * (b + (1 - abs(b)) * sign(v * z)))", {{"f", In::force, {more}, 0}, {"xy", In::x, {0.2, 0.05}, 1e-3, 3}, {"b", In::number, {0.5}, -1, 1}, {"n", In::number, {1}, 0.5, 4}}, {}},
+      {"hysteresis of Bouc and Wen", ActsOn::normal, "-f * z", "v / xy * (1 - abs(z)^n * (b + (1 - abs(b)) * sign(v * z)))", {{"f", In::force, {more}, 0}, {"xy", In::x, {0.2, 0.05}, 1e-3, 3}, {"b", In::number, {0.5}, -1, 1}, {"n", In::number, {1}, 0.5, 4}}, {}, "bouc-wen"},
       {"spring and damper in series", ActsOn::normal, "-f * z", "v - z / tau", {{"f", In::force, {10 * more}, 0}, {"tau", In::seconds, {0.01, 0.1}, 1e-4, 1}}, {v}},
       {"mass with a power of the amplitude", ActsOn::normal, "-c * abs(x)^p * a", "", {either, power(2)}, {x, a}},
       {"stiffness that changes with time", ActsOn::normal, "-c * x * (1 - exp(-t / tau))", "", {either, {"tau", In::seconds, {0.1, 0.5}, 0.003, 30}}, {x}},
@@ -120,6 +121,7 @@ bool moved(const Line& line, const Reach& r) {
 
 Form put(const Line& line, const Reach& r) {
   Form form;
+  form.listed = line.listed;
   Law law;
   law.name = line.name;
   law.acts_on = line.acts_on;
@@ -224,9 +226,7 @@ std::vector<VectorXd> shapes_of(const Form& form, Grid grid) {
     if (std::find(linear.begin(), linear.end(), static_cast<Eigen::Index>(k)) != linear.end()) continue;
     const Parameter& p = law.parameters[k];
     std::vector<double> values;
-    if (law.memory && p.name == "n") continue;  // of hysteresis the corner and the loop's shape
     if (p.name == "p") values = fine ? std::vector<double>{0.5, 1.5, 2, 2.5, 3, 4, 5} : std::vector<double>{0.5, 1.2, 2, 4};
-    else if (law.memory && p.name == "b") values = fine ? std::vector<double>{-0.6, -0.3, 0, 0.5} : std::vector<double>{-0.3, 0.5};
     else
       for (const double factor : fine ? std::vector<double>{0.2, 0.5, 1, 2, 4} : std::vector<double>{0.3, 1, 3}) values.push_back(factor * shapes.front()[static_cast<Eigen::Index>(k)]);
     std::vector<VectorXd> each;

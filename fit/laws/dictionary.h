@@ -12,6 +12,7 @@ namespace unrig {
 struct Form {
   Law law;                             ///< its scales are what the runs reach, so that coefficients are forces
   std::vector<Eigen::VectorXd> starts; ///< of its parameters: a small force of either sign, and what shapes it may have
+  std::string listed = {};             ///< id of the effect that it is, which goes by that; empty: of none
 };
 
 /// How far the runs of a fit take the states that a law may look at: largest absolute values.

@@ -61,13 +61,14 @@ Eigen::VectorXd start_of(Form form, const BesideUnknownForces& beside) {
 
 }  // namespace
 
-LawSearch::LawSearch(FitProblem& problem, const Trial& base, std::function<bool(const Trial&)> leaves_something, Listed listed)
-    : problem_(problem), base_(base), leaves_something_(std::move(leaves_something)), listed_(listed) {}
+LawSearch::LawSearch(FitProblem& problem, const Trial& base, Asked leaves_something, Asked is_noise, Among among)
+    : problem_(problem), base_(base), leaves_something_(std::move(leaves_something)), is_noise_(std::move(is_noise)), among_(among) {}
 
 /// Ids of the forms that promise most to first order, which the rig gets.
 std::vector<std::string> LawSearch::forms_worth_a_fit(const Trial& base) {
   const BesideUnknownForces beside = beside_unknown_forces(base.arrival.joint);
   std::vector<Form> forms = dictionary(problem_.rig, reach_of(beside));
+  std::erase_if(forms, [](const Form& form) { return !form.listed.empty(); });
   std::vector<std::shared_ptr<const Effect>> at_work = base.arrival.joint.model().rig().laws;  // the rig may have got others since
   std::erase_if(at_work, [&](const auto& law) { return !is_among(base.effects, law->id); });
   problem_.rig.laws = at_work;
@@ -106,17 +107,13 @@ std::vector<std::string> LawSearch::forms_worth_a_fit(const Trial& base) {
   return worth_it;
 }
 
-/// Effects of the list that may be at work beside `base`: those that are tried only where they are named and are of the kind of a form, or all others.
-std::vector<std::string> LawSearch::of_the_list(const Trial& base, const std::vector<std::string>& forms) const {
-  std::vector<std::string> kinds;
-  for (const std::string& id : forms) kinds.push_back(effect(problem_.rig, id).kind);
+/// Effects of the list that may be at work beside `base`.
+std::vector<std::string> LawSearch::of_the_list(const Trial& base) const {
   std::vector<Conditions> conditions;
   for (const RunResidual& run : base.arrival.joint.runs()) conditions.push_back(run.conditions());
   std::vector<std::string> ids;
-  for (const Effect& e : effects()) {
-    const bool wanted = forms.empty() ? e.only_if_named.empty() : !e.only_if_named.empty() && is_among(kinds, e.kind);
-    if (wanted && !is_among(base.effects, e.id) && why_idle(e, problem_.rig, conditions).empty()) ids.push_back(e.id);
-  }
+  for (const Effect& e : effects())
+    if (!is_among(base.effects, e.id) && why_idle(e, problem_.rig, conditions).empty()) ids.push_back(e.id);
   return ids;
 }
 
@@ -136,20 +133,22 @@ LawSearch::Prospects LawSearch::prospects(const Trial& base, const std::vector<s
     double& most = is_law[i] ? found.promised.by_a_law : found.promised.by_a_signal;
     most = std::max(most, trials[i]->score);
   }
-  const bool all = listed_ == Listed::only_if_named, any = found.promised.by_a_law >= found.promised.by_a_signal;
+  const bool all = among_ == Among::forms, any = found.promised.by_a_law >= found.promised.by_a_signal;
   for (std::size_t i = 0; i < ids.size(); ++i)
-    if (all || (any && is_law[i] && trials[i]->score >= half_of_it * found.promised.by_a_law)) found.laws.push_back(std::move(*trials[i]));
+    if ((all || (any && is_law[i] && trials[i]->score >= half_of_it * found.promised.by_a_law)) && may_be_seen(*trials[i], base)) found.laws.push_back(std::move(*trials[i]));
   return found;
 }
 
 /// Fitted in full, those that are worth it.
-std::vector<Trial> LawSearch::followed(std::vector<Trial> tried, const Trial& base) const {
+std::vector<Trial> LawSearch::followed(std::vector<Trial> tried, const Trial& base) {
   const bool driven = all_driven(base.arrival.joint), by_decays = shows_in_decays(base);
   in_parallel(tried.size(), [&](std::size_t i) {
     hold_undetermined(tried[i]);
     if (driven) follow_nonlinear(problem_, tried[i], base, INFINITY);
-    else if (nonlinear(tried[i])) tried[i].ruled_out = !fit_decays_first(tried[i], base, by_decays);
+    else if (nonlinear(tried[i])) tried[i].ruled_out = !fit_decays_first(tried[i], base, by_decays && is_law_id(tried[i].effects.back()));  // forms begin at an estimate
   });
+  for (const Trial& t : tried)
+    if (t.ruled_out && base.effects.empty()) ruled_out_.push_back(t.effects.back());
   // Of thousands of samples twice the excess of another is beyond any evidence.
   const auto excess = [](const Trial& t) { return std::max(0.0, left_of_decays(t) - 1); };
   double least = INFINITY;
@@ -165,14 +164,21 @@ std::vector<Trial> LawSearch::followed(std::vector<Trial> tried, const Trial& ba
 
 /// Whether the best of these, the first, asks for another law beside it.
 bool LawSearch::goes_on(const std::vector<Trial>& tried) const {
-  return !tried.empty() && tried.front().effects.size() < most_effects && leaves_something_(tried.front()) && bic_difference(tried.front(), base_) < 0;
+  return !tried.empty() && tried.front().effects.size() < most_effects && leaves_something_(tried.front()) && bic_difference(tried.front(), base_) < 0 && !is_noise_(tried.front());
 }
 
-/// Whether forms may explain what laws of the list do not, or as well: no rivals are looked for of one that leaves nothing of a mismatch too large for two laws to explain alike, unless it is tried only where it is named,
-/// and so rare that forms are as likely.
+/// Whether forms may explain what laws of the list do not, or as well: no rivals are looked for of one that leaves nothing of a mismatch too large for two laws to explain alike.
 bool LawSearch::may_have_rivals(const std::vector<Trial>& tried) const {
-  if (listed_ == Listed::only_if_named || base_.reduced_chi2() < nearly_explained) return true;
-  return std::none_of(tried.begin(), tried.end(), [&](const Trial& t) { return effect(problem_.rig, t.effects.back()).only_if_named.empty() && !leaves_something_(t); });
+  return base_.reduced_chi2() < nearly_explained || std::all_of(tried.begin(), tried.end(), leaves_something_);
+}
+
+/// A search among many ends before the least chi-square of any: the first is taken there before it is asked what it leaves. Of runs that are driven, from first guesses with what is known of the law by now.
+void LawSearch::settle_first(std::vector<Trial>& tried) const {
+  if (tried.empty() || leaves_nothing(tried.front()) || decays_decide(tried.front()) || bic_difference(tried.front(), base_) >= 0) return;
+  if (all_driven(tried.front().arrival.joint)) fit_from_first_guesses(problem_, tried.front());
+  tried.front().arrival.joint.solve({});
+  measure(tried.front());
+  tried.front() = in_finer_steps(std::move(tried.front()));
 }
 
 std::vector<Trial> LawSearch::search() {
@@ -184,22 +190,27 @@ std::vector<Trial> LawSearch::search() {
     std::vector<Trial> fitted = followed(std::move(asked.laws), base);
     std::move(fitted.begin(), fitted.end(), std::back_inserter(all));
     sort_by(all, [&](const Trial& t) { return bic_difference(t, base_); });
+    settle_first(all);
   };
   const auto with_forms = [&](const Trial& base, std::vector<std::string> ids) {
-    const std::vector<std::string> forms = forms_worth_a_fit(base), rare = of_the_list(base, forms);
-    if (!forms.empty()) ids.insert(ids.end(), rare.begin(), rare.end());
+    const std::vector<std::string> forms = forms_worth_a_fit(base);
     ids.insert(ids.end(), forms.begin(), forms.end());
     return ids;
   };
+  const auto listed = [&](const Trial& base) { return among_ == Among::laws_and_forms ? of_the_list(base) : std::vector<std::string>(); };
   tell(base_);
-  Promised promised;
-  if (listed_ == Listed::all) {
-    Prospects listed = prospects(base_, of_the_list(base_, {}), {});
-    promised = listed.promised;
-    follow(std::move(listed), base_);
+  Promised promised, beside_first;
+  std::vector<std::string> first_of_the_list;  // beside which laws of the list were looked for
+  if (among_ == Among::laws_and_forms) {
+    Prospects laws = prospects(base_, listed(base_), {});
+    promised = laws.promised;
+    follow(std::move(laws), base_);
     if (goes_on(all) && all.front().excess() < half_of_it * base_.excess()) {
       const Trial first = all.front();
-      follow(prospects(first, of_the_list(first, {}), {}), first);
+      Prospects second = prospects(first, listed(first), {});
+      beside_first = second.promised;
+      first_of_the_list = first.effects;
+      follow(std::move(second), first);
     }
   }
   if (may_have_rivals(all)) {
@@ -207,7 +218,8 @@ std::vector<Trial> LawSearch::search() {
     if (goes_on(all)) {
       const Trial first = all.front();
       tell(first);
-      follow(prospects(first, with_forms(first, listed_ == Listed::all ? of_the_list(first, {}) : std::vector<std::string>()), {}), first);
+      const bool asked = first.effects == first_of_the_list;
+      follow(prospects(first, with_forms(first, asked ? std::vector<std::string>() : listed(first)), asked ? beside_first : Promised()), first);
     }
   }
   if (!all.empty() && all.front().effects.size() > 1) {
@@ -215,7 +227,7 @@ std::vector<Trial> LawSearch::search() {
     for (Trial& fewer : taken_away(problem_, all.front())) all.push_back(std::move(fewer));
   }
   in_parallel(all.size(), [&](std::size_t i) {  // rivals are told apart by less than where a search among many ends
-    if (!leaves_nothing(all[i]) && i > 0) return;
+    if ((!leaves_nothing(all[i]) && i > 0) || decays_decide(all[i])) return;
     all[i].arrival.joint.solve({});
     measure(all[i]);
   });

@@ -13,24 +13,26 @@ namespace unrig {
 ///
 /// 1. Every form of the dictionary at several shapes, its force sent through the rig onto the readings beside all unknowns of the fit (Screening): the share of chi-square that it promises to first order.
 /// 2. The coefficients of those that promise most, and where they are seen decisively the shapes, from states that the free decays ask for beside unknown accelerations (beside_unknown_forces, screen).
-/// 3. These are fitted with all their parameters free: to the free decays first, then to all runs; runs that are driven from first guesses. Effects of the list that are tried only where they are named are fitted too
-///    where a form of their kind is. All are held against each other by BIC.
+/// 3. These are fitted with all their parameters free: to the free decays first, then to all runs; runs that are driven from first guesses. All are held against each other by BIC.
 /// 4. Where the best leaves something, a second law is looked for beside it, and what that makes superfluous is taken away.
 ///
-/// Before anything else was tried (Listed::all) laws are looked for where one of them promises most of all effects, signals included, to first order, and only what promises half as much: laws of the list, one and a second
+/// Before anything else was tried (Among::laws_and_forms) laws are looked for where one of them promises most of all effects, signals included, to first order, and only what promises half as much: laws of the list, one and a second
 /// beside it, and forms, which are their rivals.
 ///
 /// Source: M. Alvarez, D. Luengo and N. Lawrence, Latent force models, AISTATS (2009); S. L. Brunton, J. L. Proctor and J. N. Kutz, PNAS 113 (2016) 3932, whose candidates are regressed on derivatives, here on readings.
 class LawSearch {
  public:
-  /// Which laws of the list are fitted beside those of the dictionary.
-  enum class Listed { only_if_named, all };
+  /// Which are fitted: those of the dictionary, or laws of the list too.
+  enum class Among { forms, laws_and_forms };
 
-  /// `problem` lives as long as what is found, and its rig gets the laws that are tried. `leaves_something`: whether a fit does.
-  LawSearch(FitProblem& problem, const Trial& base, std::function<bool(const Trial&)> leaves_something, Listed listed);
+  using Asked = std::function<bool(const Trial&)>;
+  /// `problem` lives as long as what is found, and its rig gets the laws that are tried. `leaves_something`: whether a fit does; `is_noise`: whether noise of a colour explains that.
+  LawSearch(FitProblem& problem, const Trial& base, Asked leaves_something, Asked is_noise, Among among);
 
   /// All sets that were fitted in full, `base` with one law more or two, the best first; empty where no form explains anything.
   std::vector<Trial> search();
+  /// Laws against which the free decays speak beside nothing.
+  const std::vector<std::string>& ruled_out() const { return ruled_out_; }
 
  private:
   /// Largest share of chi-square that was promised to first order.
@@ -44,15 +46,17 @@ class LawSearch {
   };
   Prospects prospects(const Trial& base, const std::vector<std::string>& ids, const Promised& known) const;
   std::vector<std::string> forms_worth_a_fit(const Trial& base);
-  std::vector<std::string> of_the_list(const Trial& base, const std::vector<std::string>& forms) const;
-  std::vector<Trial> followed(std::vector<Trial> tried, const Trial& base) const;
+  std::vector<std::string> of_the_list(const Trial& base) const;
+  void settle_first(std::vector<Trial>& tried) const;
+  std::vector<Trial> followed(std::vector<Trial> tried, const Trial& base);
   bool goes_on(const std::vector<Trial>& tried) const;
   bool may_have_rivals(const std::vector<Trial>& tried) const;
 
   FitProblem& problem_;
   const Trial& base_;
-  std::function<bool(const Trial&)> leaves_something_;
-  Listed listed_;
+  Asked leaves_something_, is_noise_;
+  std::vector<std::string> ruled_out_;
+  Among among_;
 };
 
 }  // namespace unrig

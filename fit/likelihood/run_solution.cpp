@@ -278,7 +278,7 @@ LinearSystem RunResidual::searched_system(const VectorXd& theta) const {
   LinearSystem system = model_->system(conditions_, theta, channels_);
   for (Feedback& f : system.feedback) {
     if (f.rounded) f.law = f.rounded;
-    f.steps_per_sample = glance_ ? 1 : finer_ * f.steps_per_sample;
+    f.steps_per_sample = glance_ ? finer_ : finer_ * f.steps_per_sample;
   }
   return system;
 }

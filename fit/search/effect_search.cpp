@@ -224,6 +224,12 @@ Trial screened(const FitProblem& problem, const Screening& screening, const Tria
   return trial;
 }
 
+bool may_be_seen(const Trial& screened, const Trial& base) {
+  double samples = 0;
+  for (const double n : base.samples) samples += n;
+  return samples * screened.score > decisive;
+}
+
 void hold_undetermined(Trial& trial) {
   glance(trial, true);
   hold_undetermined(trial.arrival.joint);
@@ -296,6 +302,14 @@ void follow_finer(Trial& trial, Index times) {
   fit_own_parameters(joint);  // theta is nearer now
   temper(joint);
   fit_fully(trial, 2);
+}
+
+Trial in_finer_steps(Trial trial) {
+  constexpr Eigen::Index finer = 4;
+  if (trial.effects.empty() || !nonlinear(trial) || decays_decide(trial) || trial.reduced_chi2() > nearly_explained || trial.arrival.joint.runs().front().finer() >= finer) return trial;
+  Trial again = trial;
+  follow_finer(again, finer);
+  return again.excess() < 0.5 * trial.excess() ? again : trial;
 }
 
 double left_of_decays(const Trial& trial) {

@@ -64,6 +64,9 @@ void take_noise_of(Trial& trial, const Trial& other);
 /// `effects`, those of base and one or more: where their search begins, and as score what one linear step from `base` would remove. `screening`: of base.
 Trial screened(const FitProblem& problem, const Screening& screening, const Trial& base, const std::vector<std::string>& effects);
 
+/// Whether what a law promises to first order could be decisive among the samples of `base`.
+bool may_be_seen(const Trial& screened, const Trial& base);
+
 /// Holds the unknowns of a screened trial that its runs do not determine: ready to be fitted.
 void hold_undetermined(Trial& trial);
 
@@ -107,6 +110,10 @@ void leave_out_terms(Trial& trial);
 
 /// Follows its nonlinear laws in so many times the steps that they ask for, and fits again.
 void follow_finer(Trial& trial, Eigen::Index times);
+
+/// With a law at work that leaves something near the noise: the same followed in finer steps, where these leave less than half of it. What coarse steps make of a sharp law is no effect; where they are
+/// not what is missing, they would only make everything after it dearer.
+Trial in_finer_steps(Trial trial);
 
 /// The same all over again from first guesses, with windows that grow from a few periods: for effects without which the rig's parameters go far astray. Keeps the better.
 void fit_from_first_guesses(const FitProblem& problem, Trial& trial);

@@ -57,7 +57,7 @@ std::vector<FirstOrder::Beside> FirstOrder::beside(const JointProblem& with, con
       return;
     }
     VectorXd theta = with.theta(r);
-    if (!own.empty()) {
+    if (!own.empty() && !effect(with.model().rig(), id).frequency) {  // that of a tone is where its states begin
       const Parameter& size = with.model().parameters()[static_cast<std::size_t>(own.front())];
       theta[own.front()] = std::clamp(faint * theta[own.front()], size.lower, size.upper);
     }

@@ -27,7 +27,7 @@ class FirstOrder {
     double share = 0;             ///< of chi-square that one linear step in all unknowns removes, those of `with` included; minus infinity where a model runs away
     double largest_argument = 0;  ///< that the laws' first arguments reach
   };
-  /// `with`: the same runs with effect `id` beside, with the shape that it stands at and a size (its first parameter) that is next to nothing.
+  /// `with`: the same runs with effect `id` beside, with the shape that it stands at and a size (its first parameter, or where the states of a tone begin) that is next to nothing.
   Promise promise(const JointProblem& with, const std::string& id) const;
 
  private:

@@ -17,12 +17,15 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
+/// How many laws act in a run.
+Index laws_in(const RunResidual& run) { return static_cast<Index>(run.model().system(run.conditions(), run.model().start_values(), run.channels()).feedback.size()); }
+
 /// Which of these starts, and where it leads: to where some iterations end, if that halves the chi-square `without` the effect, and to the best as it is if not. What starts leave as they are
-/// favours the one at which an effect does least. Where motions are estimated too iterations are dear, and the search goes through the decays first (fit/search/decays_first.h).
+/// favours the one at which an effect does least. Where motions are estimated too or laws are at work iterations are dear: the best start is taken as it is.
 JointProblem best_of(const std::vector<JointProblem>& starts, double without) {
   if (starts.size() == 1) return starts.front();
   const std::vector<RunResidual>& runs = starts.front().runs();
-  const bool with_motions = std::any_of(runs.begin(), runs.end(), [](const RunResidual& run) { return run.motion().unknowns() > 0; });
+  const bool dear = std::any_of(runs.begin(), runs.end(), [](const RunResidual& run) { return run.motion().unknowns() > 0 || laws_in(run) > 0; });
   const auto least = [](const std::vector<JointProblem>& joints) {
     std::vector<double> left(joints.size());
     in_parallel(joints.size(), [&](std::size_t i) {
@@ -33,7 +36,7 @@ JointProblem best_of(const std::vector<JointProblem>& starts, double without) {
     return std::pair(*best, static_cast<std::size_t>(best - left.begin()));
   };
   const std::size_t start = least(starts).second;
-  if (with_motions) return starts[start];
+  if (dear) return starts[start];
   std::vector<JointProblem> solved = starts;
   in_parallel(solved.size(), [&](std::size_t i) {
     JointProblem::SolveOptions options;
@@ -46,9 +49,6 @@ JointProblem best_of(const std::vector<JointProblem>& starts, double without) {
   constexpr double worth_it = 0.5;
   return left < worth_it * without ? solved[end] : starts[start];
 }
-
-/// How many laws act in a run.
-Index laws_in(const RunResidual& run) { return static_cast<Index>(run.model().system(run.conditions(), run.model().start_values(), run.channels()).feedback.size()); }
 
 void set_values(JointProblem& joint, const std::string& id, const VectorXd& values) {
   const std::vector<Parameter>& parameters = effect(joint.model().rig(), id).parameters_on(joint.model().rig());

@@ -133,7 +133,7 @@ void try_effects(const TrialProblem& problem, const Strings& effects, std::mt199
   DiagnoseProblem diagnosis;
   diagnosis.rig = campaign.rig;
   diagnosis.runs = campaign.runs;
-  diagnosis.effects = effects;
+  if (!problem.effects.empty() || problem.outside) diagnosis.effects = effects;
   diagnosis.verdict_only = true;
   if (problem.outside) std::erase_if(diagnosis.effects, [&](const std::string& id) { return has(outcome.hidden, id); });
   take_verdict(diagnose(diagnosis), outcome);

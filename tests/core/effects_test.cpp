@@ -402,13 +402,6 @@ TEST(Effects, SayWhyTheyCannotAct) {
   for (const auto& [e, rig] : cases()) EXPECT_THAT(why_idle(*e, rig, {conditions_for(rig)}), IsEmpty()) << "otherwise the tests of this file look at less than they say";
 }
 
-TEST(Effects, SayWhyADiagnosisTriesThemOnlyWhereNamed) {
-  std::vector<std::string> ids;
-  for (const Effect& e : effects())
-    if (!e.only_if_named.empty()) ids.push_back(e.id);
-  EXPECT_THAT(ids, testing::UnorderedElementsAre("bouc-wen", "cubic-damping"));
-}
-
 TEST(Effects, AreDistinctAtTheirStarts) {
   for (const Rig& rig : {beam(), two_modes()})
     for (const Effect& e : effects()) {

@@ -6,6 +6,7 @@
 #include <numbers>
 #include <random>
 
+#include "fit/diagnose/diagnose.h"
 #include "fit/fit.h"
 
 namespace unrig {
@@ -53,11 +54,11 @@ const FittedParameter& parameter(const FitResult& result, const std::string& nam
 
 class Hysteresis : public testing::TestWithParam<unsigned> {};
 
-TEST_P(Hysteresis, IsFittedByName) {
-  const Truth truth;
-  constexpr double dt = 2e-3, noise = 2e-5;
-  constexpr Index samples = 6000;
-  std::mt19937_64 random(GetParam());
+constexpr double dt = 2e-3, noise = 2e-5;
+
+/// A rig that is known as a mode near the truth, and its recording.
+FitProblem recorded(const Truth& truth, unsigned seed, Index samples) {
+  std::mt19937_64 random(seed);
   std::uniform_real_distribution<double> phase(0, 2 * pi);
   VectorXd force = VectorXd::Zero(samples);
   for (int line = 1; line <= 60; ++line) {  // 0.2 to 12 Hz
@@ -77,6 +78,12 @@ TEST_P(Hysteresis, IsFittedByName) {
   run.dt = dt;
   run.channels = {{"force", "N", "N", 1, force, 0}, {"gauge", "m", "m", 1, reading, 0}};
   problem.runs = {run};
+  return problem;
+}
+
+TEST_P(Hysteresis, IsFittedByName) {
+  const Truth truth;
+  FitProblem problem = recorded(truth, GetParam(), 6000);
   const FitResult without = fit(problem);
   EXPECT_GT(without.runs[0].channels[0].rms_residual, 10 * noise) << "a linear rig does not explain it";
   problem.effects = {"bouc-wen"};
@@ -97,6 +104,17 @@ TEST_P(Hysteresis, IsFittedByName) {
   near("bouc-wen.sharpness", truth.sharpness);
 }
 INSTANTIATE_TEST_SUITE_P(Forces, Hysteresis, testing::Values(1, 6, 7));  // from 1 and 6 the start of least chi-square loses its way
+
+/// No candidate is named; the run is driven, so that no decay tells of the law. The kinks of the force may remain.
+TEST(HysteresisOfADrivenRun, IsNamedByADiagnosis) {
+  const FitProblem problem = recorded(Truth(), 1, 3000);
+  DiagnoseProblem diagnosis;
+  diagnosis.rig = problem.rig;
+  diagnosis.runs = problem.runs;
+  const Diagnosis d = diagnose(diagnosis);
+  ASSERT_EQ(d.missing.size(), 1u);
+  EXPECT_EQ(d.missing.front().effect, "bouc-wen");
+}
 
 }  // namespace
 }  // namespace unrig
