@@ -33,7 +33,7 @@ namespace {
 
 using Eigen::Index;
 
-constexpr double twice_the_noise = 2, half_of_it = 0.5;
+constexpr double twice_the_noise = 2;
 
 /// The time that a diagnosis may take, over the parts of it that search [s of the processor]; 0: any.
 class SearchTime {
@@ -389,16 +389,17 @@ Diagnosis diagnose_in_order(const DiagnoseProblem& problem, bool numbers_known) 
   }
   std::unique_ptr<ExactModel> exact;
   if (problem.hidden) exact = held_against(*problem.hidden, described ? *description->problem : fit_problem, described ? description->trial : baseline, *selection, found);
-  if (may_find_laws && !laws && !described && !found.explains())
+  const bool one_law = found.best.effects.size() == 1 && brings_a_law(found.best);  // forms may be its rivals
+  if (may_find_laws && !laws && !described && (!found.explains() || one_law))
     time.spend([&] {
       tell("looking for the law of what is missing");
       const auto add_beside = [&](const Trial& base) {
         for (Trial& t : search_laws(fit_problem, baseline, base, LawSearch::Among::forms, *selection)) laws_tried.push_back(std::move(t));
       };
-      // Forms are held against laws of the list before, and beside what takes most of the mismatch below.
-      if (laws_tried.empty() && found.best.excess() > half_of_it * baseline.excess()) add_beside(baseline);
+      // Forms were held against laws of the list before, and are looked for beside what takes most of the mismatch below.
+      if (laws_tried.empty() && (one_law || found.best.excess() > half_of_it * baseline.excess())) add_beside(baseline);
       const bool beside_it = begun && same_set(begun->effects, found.best.effects);  // laws were looked for before
-      if (!found.best.effects.empty() && !beside_it) add_beside(found.best);
+      if (!found.best.effects.empty() && !beside_it && !found.explains()) add_beside(found.best);
       laws = choose_law(problem, fit_problem, files, baseline, laws_tried, *selection, found);
     });
   for (const Trial& t : laws_tried)

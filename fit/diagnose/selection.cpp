@@ -23,7 +23,6 @@ using Trials = std::vector<Trial>;  // the best first once they are fitted
 using Tell = std::function<void(const std::string&)>;
 
 constexpr double twice_the_noise = 2;
-constexpr double half_way = 0.5;
 constexpr double hardly_less = 0.9;  // of the excess: an effect that leaves so much of it is not what is missing
 constexpr std::size_t most_refits = 5, most_in_full = 2;
 constexpr std::size_t few = 7;  // candidates that are all worth a fit
@@ -172,10 +171,10 @@ Trials Selection::try_one_more(const Trial& base, const Strings& hopeless) {
   for (const auto& trial : prepared) {
     const bool promises_nothing = effect(trial->effects.back()).parameters_on(problem_.rig).empty();  // it may hold all the same
     const bool follows_law = nonlinear(*trial), far = base.reduced_chi2() > twice_the_noise;
-    const bool steps_say_little = far && best_score < half_way;  // of laws far from the truth
+    const bool steps_say_little = far && best_score < half_of_it;  // of laws far from the truth
     const bool promises = linear.size() + others.size() < most_refits && (trial->score > 0.25 * best_score || (follows_law && steps_say_little));
     const bool step_says_nothing = steps_say_little && brings_a_law(*trial);
-    if (brings_a_law(*trial) && ((!far && !may_be_seen(*trial, base)) || (is_first(base) && trial->score < half_way * taken_))) continue;
+    if (brings_a_law(*trial) && ((!far && !may_be_seen(*trial, base)) || (is_first(base) && trial->score < half_of_it * taken_))) continue;
     if (prepared.size() <= few || promises_nothing || promises || step_says_nothing) (follows_law ? others : linear).push_back(std::move(*trial));
     else if (!follows_law) unpromising.push_back(std::move(*trial));
   }
@@ -252,8 +251,8 @@ Trials Selection::rivals(const Trial& best, const std::string& member) {
     if (is_fitted(set)) return;
     Trial trial = screened(fit_problem_, screening, others, set);
     if (brings_a_law(trial) && others.reduced_chi2() > nearly_explained) return;  // too large a mismatch for two laws to explain alike
-    if (brings_a_law(trial) && fewer.empty() && trial.score < half_way * taken_) return;
-    if (without - (1 - trial.score) * now > half_way * (without - with_it)) prepared[i] = std::move(trial);
+    if (brings_a_law(trial) && fewer.empty() && trial.score < half_of_it * taken_) return;
+    if (without - (1 - trial.score) * now > half_of_it * (without - with_it)) prepared[i] = std::move(trial);
   });
   Trials rivals;
   for (std::optional<Trial>& trial : prepared)
@@ -352,7 +351,7 @@ void Selection::grow(Trial& best, const std::function<bool(const Trial&)>& enoug
     if (tried.empty()) break;
     const Trial next = tried.front();
     if (!(is_first(best) || plausible(next)) || bic_difference(next, best) > -decisive) break;
-    if (next.excess() < half_way * best.excess()) hopeless.clear();
+    if (next.excess() < half_of_it * best.excess()) hopeless.clear();
     best = next;
     if (!stopped_) best = settled(without_superfluous(next));
     std::move(tried.begin(), tried.end(), std::back_inserter(tried_));

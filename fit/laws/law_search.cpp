@@ -19,7 +19,6 @@ namespace unrig {
 namespace {
 
 constexpr std::size_t most_in_full = 5;
-constexpr double half_of_it = 0.5;  // of what the best promises or explains: what is less does not come out ahead among thousands of samples
 
 /// Ascending in a number that is asked for once of each; what is none comes last.
 template <class T, class Key>
@@ -117,8 +116,8 @@ std::vector<std::string> LawSearch::of_the_list(const Trial& base) const {
   return ids;
 }
 
-/// Those of `ids` that are worth a fit beside `base`: laws that promise half of what the best of all promises, and none where a signal promises more than any law. `known`: what was asked about before.
-LawSearch::Prospects LawSearch::prospects(const Trial& base, const std::vector<std::string>& ids, const Promised& known) const {
+/// Those of `ids` that are worth a fit beside `base`: laws that promise the share `least` of what the best of all promises, and none where a signal promises more than any law. `known`: what was asked about before.
+LawSearch::Prospects LawSearch::prospects(const Trial& base, const std::vector<std::string>& ids, const Promised& known, double least) const {
   const Screening screening(problem_, base.arrival);
   std::vector<std::optional<Trial>> trials(ids.size());
   std::vector<char> is_law(ids.size());
@@ -135,7 +134,7 @@ LawSearch::Prospects LawSearch::prospects(const Trial& base, const std::vector<s
   }
   const bool all = among_ == Among::forms, any = found.promised.by_a_law >= found.promised.by_a_signal;
   for (std::size_t i = 0; i < ids.size(); ++i)
-    if ((all || (any && is_law[i] && trials[i]->score >= half_of_it * found.promised.by_a_law)) && may_be_seen(*trials[i], base)) found.laws.push_back(std::move(*trials[i]));
+    if ((all || (any && is_law[i] && trials[i]->score >= least * found.promised.by_a_law)) && may_be_seen(*trials[i], base)) found.laws.push_back(std::move(*trials[i]));
   return found;
 }
 
@@ -167,14 +166,14 @@ bool LawSearch::goes_on(const std::vector<Trial>& tried) const {
   return !tried.empty() && tried.front().effects.size() < most_effects && leaves_something_(tried.front()) && bic_difference(tried.front(), base_) < 0 && !is_noise_(tried.front());
 }
 
-/// Whether forms may explain what laws of the list do not, or as well: no rivals are looked for of one that leaves nothing of a mismatch too large for two laws to explain alike.
+/// Whether forms may explain what laws of the list do not, or as well. Of one that leaves nothing of a mismatch too large for two laws to explain alike only a form that promises more is a rival.
 bool LawSearch::may_have_rivals(const std::vector<Trial>& tried) const {
   return base_.reduced_chi2() < nearly_explained || std::all_of(tried.begin(), tried.end(), leaves_something_);
 }
 
-/// A search among many ends before the least chi-square of any: the first is taken there before it is asked what it leaves. Of runs that are driven, from first guesses with what is known of the law by now.
+/// A search among many ends before the least chi-square of any: where it is near, the first is taken there before it is asked what it leaves. Of runs that are driven, from first guesses with what is known of the law by now.
 void LawSearch::settle_first(std::vector<Trial>& tried) const {
-  if (tried.empty() || leaves_nothing(tried.front()) || decays_decide(tried.front()) || bic_difference(tried.front(), base_) >= 0) return;
+  if (tried.empty() || leaves_nothing(tried.front()) || tried.front().reduced_chi2() > nearly_explained || decays_decide(tried.front()) || bic_difference(tried.front(), base_) >= 0) return;
   if (all_driven(tried.front().arrival.joint)) fit_from_first_guesses(problem_, tried.front());
   tried.front().arrival.joint.solve({});
   measure(tried.front());
@@ -213,14 +212,12 @@ std::vector<Trial> LawSearch::search() {
       follow(std::move(second), first);
     }
   }
-  if (may_have_rivals(all)) {
-    follow(prospects(base_, with_forms(base_, {}), promised), base_);
-    if (goes_on(all)) {
-      const Trial first = all.front();
-      tell(first);
-      const bool asked = first.effects == first_of_the_list;
-      follow(prospects(first, with_forms(first, asked ? std::vector<std::string>() : listed(first)), asked ? beside_first : Promised()), first);
-    }
+  follow(prospects(base_, with_forms(base_, {}), promised, may_have_rivals(all) ? half_of_it : 1), base_);
+  if (goes_on(all)) {
+    const Trial first = all.front();
+    tell(first);
+    const bool asked = first.effects == first_of_the_list;
+    follow(prospects(first, with_forms(first, asked ? std::vector<std::string>() : listed(first)), asked ? beside_first : Promised()), first);
   }
   if (!all.empty() && all.front().effects.size() > 1) {
     problem_.rig.laws = all.front().arrival.joint.model().rig().laws;

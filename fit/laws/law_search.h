@@ -44,13 +44,13 @@ class LawSearch {
     std::vector<Trial> laws;
     Promised promised;
   };
-  Prospects prospects(const Trial& base, const std::vector<std::string>& ids, const Promised& known) const;
+  Prospects prospects(const Trial& base, const std::vector<std::string>& ids, const Promised& known, double least = half_of_it) const;
+  bool may_have_rivals(const std::vector<Trial>& tried) const;
   std::vector<std::string> forms_worth_a_fit(const Trial& base);
   std::vector<std::string> of_the_list(const Trial& base) const;
   void settle_first(std::vector<Trial>& tried) const;
   std::vector<Trial> followed(std::vector<Trial> tried, const Trial& base);
   bool goes_on(const std::vector<Trial>& tried) const;
-  bool may_have_rivals(const std::vector<Trial>& tried) const;
 
   FitProblem& problem_;
   const Trial& base_;
