@@ -336,7 +336,7 @@ Trial Selection::settled(Trial trial) {
 
 void Selection::grow(Trial& best, const std::function<bool(const Trial&)>& enough, std::optional<Trial>& sufficient) {
   if (best.reduced_chi2() > twice_the_noise) take_known_lines(best);
-  Strings hopeless = ruled_out_;  // laws with which alone the fit is worse than without: from that far away they are not found, and are not tried again before half of the way is gone
+  Strings hopeless;  // laws with which alone the fit is worse than without: from that far away they are not found, and are not tried again before half of the way is gone
   while (!stopped_ && best.effects.size() < most_effects && what_remains(best).found) {
     best = in_finer_steps(best);
     if (!what_remains(best).found) break;
@@ -366,7 +366,7 @@ Trial Selection::best_set(const std::function<bool(const Trial&)>& enough, const
   Trial best = begun ? *begun : baseline_;
   std::optional<Trial> sufficient;  // a law that is followed all but exactly: what it leaves has a name only where that leaves nothing
   try {
-    if (begun) best = settled(std::move(best));
+    if (begun) best = settled(best);
     if (begun && enough && what_remains(best).found && enough(best)) return best;
     grow(best, enough, sufficient);
   } catch (const OutOfTime&) {

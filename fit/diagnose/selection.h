@@ -34,9 +34,6 @@ class Selection {
   /// Something else takes this share of chi-square: a law that promises less than half of that does not come out ahead, and is not fitted.
   void hold_laws_against(double share) { taken_ = share; }
 
-  /// Laws against which the free decays speak beside nothing.
-  void rule_out(std::vector<std::string> laws) { ruled_out_ = std::move(laws); }
-
   /// Whether the search ended because its time was up (core/numerics/time_limit.h), which is lifted then.
   bool stopped() const { return stopped_; }
   /// Sets that were fitted in rounds from which the search went on.
@@ -72,7 +69,6 @@ class Selection {
   std::vector<std::string> lines_;  // signals at frequencies known beforehand that were taken out first
   bool stopped_ = false;
   double taken_ = 0;
-  std::vector<std::string> ruled_out_;
 };
 
 /// Probabilities of a ranking (the best first) once `named` is the answer: a set of lower BIC that is neither named nor `unrefuted` leaves something or predicts worse, and so explains nothing.

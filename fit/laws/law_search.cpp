@@ -139,15 +139,13 @@ LawSearch::Prospects LawSearch::prospects(const Trial& base, const std::vector<s
 }
 
 /// Fitted in full, those that are worth it.
-std::vector<Trial> LawSearch::followed(std::vector<Trial> tried, const Trial& base) {
+std::vector<Trial> LawSearch::followed(std::vector<Trial> tried, const Trial& base) const {
   const bool driven = all_driven(base.arrival.joint), by_decays = shows_in_decays(base);
   in_parallel(tried.size(), [&](std::size_t i) {
     hold_undetermined(tried[i]);
     if (driven) follow_nonlinear(problem_, tried[i], base, INFINITY);
-    else if (nonlinear(tried[i])) tried[i].ruled_out = !fit_decays_first(tried[i], base, by_decays && is_law_id(tried[i].effects.back()));  // forms begin at an estimate
+    else if (nonlinear(tried[i])) tried[i].ruled_out = !fit_decays_first(tried[i], base, by_decays);
   });
-  for (const Trial& t : tried)
-    if (t.ruled_out && base.effects.empty()) ruled_out_.push_back(t.effects.back());
   // Of thousands of samples twice the excess of another is beyond any evidence.
   const auto excess = [](const Trial& t) { return std::max(0.0, left_of_decays(t) - 1); };
   double least = INFINITY;

@@ -31,8 +31,6 @@ class LawSearch {
 
   /// All sets that were fitted in full, `base` with one law more or two, the best first; empty where no form explains anything.
   std::vector<Trial> search();
-  /// Laws against which the free decays speak beside nothing.
-  const std::vector<std::string>& ruled_out() const { return ruled_out_; }
 
  private:
   /// Largest share of chi-square that was promised to first order.
@@ -49,13 +47,12 @@ class LawSearch {
   std::vector<std::string> forms_worth_a_fit(const Trial& base);
   std::vector<std::string> of_the_list(const Trial& base) const;
   void settle_first(std::vector<Trial>& tried) const;
-  std::vector<Trial> followed(std::vector<Trial> tried, const Trial& base);
+  std::vector<Trial> followed(std::vector<Trial> tried, const Trial& base) const;
   bool goes_on(const std::vector<Trial>& tried) const;
 
   FitProblem& problem_;
   const Trial& base_;
   Asked leaves_something_, is_noise_;
-  std::vector<std::string> ruled_out_;
   Among among_;
 };
 
