@@ -227,7 +227,7 @@ Trial screened(const FitProblem& problem, const Screening& screening, const Tria
 bool may_be_seen(const Trial& screened, const Trial& base) {
   double samples = 0;
   for (const double n : base.samples) samples += n;
-  return samples * screened.score > decisive;
+  return base.reduced_chi2() > nearly_explained || samples * screened.score > decisive;
 }
 
 void hold_undetermined(Trial& trial) {

@@ -21,11 +21,9 @@ using Eigen::VectorXd;
 Index laws_in(const RunResidual& run) { return static_cast<Index>(run.model().system(run.conditions(), run.model().start_values(), run.channels()).feedback.size()); }
 
 /// Which of these starts, and where it leads: to where some iterations end, if that halves the chi-square `without` the effect, and to the best as it is if not. What starts leave as they are
-/// favours the one at which an effect does least. Where motions are estimated too or laws are at work iterations are dear: the best start is taken as it is.
-JointProblem best_of(const std::vector<JointProblem>& starts, double without) {
+/// favours the one at which an effect does least. Where iterations are `dear` the best start is taken as it is.
+JointProblem best_of(const std::vector<JointProblem>& starts, double without, bool dear) {
   if (starts.size() == 1) return starts.front();
-  const std::vector<RunResidual>& runs = starts.front().runs();
-  const bool dear = std::any_of(runs.begin(), runs.end(), [](const RunResidual& run) { return run.motion().unknowns() > 0 || laws_in(run) > 0; });
   const auto least = [](const std::vector<JointProblem>& joints) {
     std::vector<double> left(joints.size());
     in_parallel(joints.size(), [&](std::size_t i) {
@@ -141,7 +139,9 @@ JointProblem Screening::best_start(const JointProblem& joint, const std::string&
     at.push_back(joint);
     set_values(at.back(), id, start);
   }
-  return best_of(at, without_.joint.chi2());
+  const std::vector<RunResidual>& known = without_.joint.runs();
+  const bool has_laws = std::any_of(known.begin(), known.end(), [](const RunResidual& run) { return laws_in(run) > 0; });
+  return best_of(at, without_.joint.chi2(), with_motions || has_laws);
 }
 
 Arrival transferred(const FitProblem& problem, const Arrival& without, const std::shared_ptr<const AeroelasticModel>& model) {
