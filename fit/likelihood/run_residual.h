@@ -211,7 +211,7 @@ class RunResidual {
   void set_aside(bool aside) { aside_ = aside; }
   bool is_aside() const { return aside_; }
 
-  /// A glance at a nonlinear run: c in two steps, and the model in one step a sample whatever its laws ask for. Enough to compare starts and candidates.
+  /// A glance at a nonlinear run: c in two steps, and the model in as many steps a sample as `finer` says, whatever its laws ask for. Enough to compare starts and candidates.
   void glance(bool only) {
     if (glance_ != only) forget_solutions();
     glance_ = only;

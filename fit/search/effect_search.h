@@ -65,7 +65,7 @@ void take_noise_of(Trial& trial, const Trial& other);
 /// `effects`, those of base and one or more: where their search begins, and as score what one linear step from `base` would remove. `screening`: of base.
 Trial screened(const FitProblem& problem, const Screening& screening, const Trial& base, const std::vector<std::string>& effects);
 
-/// Whether what a law promises to first order could be decisive among the samples of `base`.
+/// Whether what a law promises to first order could be decisive among the samples of `base`; of a base far from the noise always: a step says little there.
 bool may_be_seen(const Trial& screened, const Trial& base);
 
 /// Holds the unknowns of a screened trial that its runs do not determine: ready to be fitted.
