@@ -42,6 +42,10 @@ struct FittedParameter {
   double start = 0;
   bool identified = true;
   std::string advice;     ///< where not identified: why, and what to record
+  std::string effect = {};  ///< whose it is; empty: the rig's own
+  int place = -1;           ///< among the parameters of that effect, from 0
+  Role role = Role::effect;
+  int mode = -1;            ///< of a rig known as modes: whose it is, from 0
 };
 
 struct FittedChannel {

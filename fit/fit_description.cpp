@@ -83,7 +83,7 @@ MatrixXd correlation_of(const MatrixXd& covariance) {
 double reading_of_steady_load(const RunResidual& residual) {
   const Rig& rig = residual.model().rig();
   const Conditions& c = residual.conditions();
-  if (rig.is_modal() || rig.gauge_element == 0 || c.speed == 0 || residual.channels().front() != "gauge") return 0;
+  if (rig.gauge_element == 0 || c.speed == 0 || residual.channels().front() != "gauge") return 0;
   return gauge_reading_of_unit_coefficient(rig, c.density, c.speed);
 }
 
@@ -180,6 +180,10 @@ void describe_parameters(const JointProblem& joint, const ParameterUncertainty& 
     fitted.run = u.run >= 0 ? joint.runs()[static_cast<std::size_t>(u.run)].run().file : "";
     fitted.value = u.value;
     fitted.start = start_of(p, starts);
+    fitted.effect = p.effect;
+    fitted.place = p.place;
+    fitted.role = p.role;
+    fitted.mode = p.mode;
     fitted.std_error = std::nan("");
     const auto position = std::find(uncertainty.free.begin(), uncertainty.free.end(), i);
     if (position == uncertainty.free.end()) {

@@ -298,8 +298,10 @@ FittedRig read_fit(const json& in, const std::string& path) {
       p.identified = item.value("identified", true);
       for (const std::string& id : fit.effects) {
         const Effect& e = effect(laws, id);
-        const auto is_it = [&](const Parameter& own) { return id + "." + own.name == p.name; };
-        if (p.name.starts_with(id + ".") && std::none_of(e.parameters.begin(), e.parameters.end(), is_it) && std::none_of(e.modal_parameters.begin(), e.modal_parameters.end(), is_it))
+        for (const std::vector<Parameter>* of_rig : {&e.parameters, &e.modal_parameters})
+          for (std::size_t k = 0; k < of_rig->size(); ++k)
+            if (p.name == id + "." + (*of_rig)[k].name) p.effect = id, p.place = static_cast<int>(k);
+        if (p.effect.empty() && p.name.starts_with(id + "."))
           throw refuse(fmt::format("a parameter {}, which the effect {} of this version does not have", p.name, id));
       }
       fit.parameters.push_back(p);

@@ -313,7 +313,7 @@ std::vector<Suspicion> suspicions(const Rig& rig, const std::vector<Run>& runs) 
     constexpr std::size_t few = 20;  // of twenty readings one may be clipped, and what the others say still counts
     if (!spoilt && (!gauge || few * gauge->clipped < static_cast<std::size_t>(gauge->value.size()))) whole.push_back(run);
   }
-  if (rig.is_modal() || rig.gauge_element == 0 || whole.empty()) return found;
+  if (rig.gauge_element == 0 || whole.empty()) return found;
   const Campaign campaign(rig, whole);
   if (const auto s = slip(rig, whole, campaign)) {
     found.push_back(*s);

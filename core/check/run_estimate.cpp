@@ -291,7 +291,7 @@ RunEstimate estimate(const CheckModel& check, const Run& run, double reference) 
   RunEstimate found;
   found.kind = run.kind;
   const Rig& rig = check.rig();
-  if (rig.is_modal() || rig.gauge_element == 0 || !run.find("gauge")) return found;
+  if (rig.gauge_element == 0 || !run.find("gauge")) return found;
   found.modelled = coupled_frequencies(rig, check.basis(), run.density)[0];
   found.fluid_share = fluid_share(check, run.density);
   found.periods = run.dt * static_cast<double>(run.samples()) * found.modelled;

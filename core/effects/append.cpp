@@ -54,9 +54,8 @@ std::string why_idle(const Effect& e, const Rig& rig, const std::vector<Conditio
 
 Effect::Band bounds_at(const AeroelasticModel& model, Index parameter, double value) {
   const Parameter& p = model.parameters()[static_cast<std::size_t>(parameter)];
-  for (const std::string& id : model.effect_ids()) {
-    const Effect& e = effect(model.rig(), id);
-    if (e.bands.empty() || p.name != id + "." + e.parameters_on(model.rig()).front().name) continue;
+  if (p.place == 0 && !effect(model.rig(), p.effect).bands.empty()) {
+    const Effect& e = effect(model.rig(), p.effect);
     const auto away = [&](const Effect::Band& b) { return std::max({b.first - value, value - b.second, 0.0}); };
     return *std::min_element(e.bands.begin(), e.bands.end(), [&](const Effect::Band& a, const Effect::Band& b) { return away(a) < away(b); });
   }

@@ -45,4 +45,10 @@ void parse_command_line(CLI::App& app, int argc, char** argv) {
   app.parse(argc, argv);
 }
 
+std::string wrong_with_limit(const std::string& text) {
+  double value = 0;
+  if (CLI::detail::lexical_cast(text, value) && value > 0) return {};
+  return fmt::format("{}, where a number above zero is wanted, or inf for any", text);
+}
+
 }  // namespace unrig

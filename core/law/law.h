@@ -37,6 +37,8 @@ struct Law {
   bool uses(Symbol symbol) const { return force.uses(symbol) || (memory && memory->uses(symbol)); }
   /// What kind of physics the symbols make it: memory, inertia, signal, lift, stiffness, friction (a damping that stays bounded) or damping.
   std::string kind() const;
+  /// Whether it has no formula of its own: a smooth curve of the state, under the name that the dictionary gives those.
+  bool is_curve() const { return name.starts_with("curve"); }
 };
 
 /// Reads a law file. Throws InputError for what is no such file; of an expression with its text and a mark below the place:

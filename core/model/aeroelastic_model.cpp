@@ -202,15 +202,22 @@ Eigen::VectorXd coupled_frequencies(const Rig& rig, const Basis& basis, double d
   return eigen.eigenvalues().cwiseSqrt() / (2 * pi);
 }
 
+double lowest_frequency(const Rig& rig, double density) {
+  if (!rig.is_modal()) return coupled_frequencies(rig, make_basis(rig, Index{1}, Index{1}), density)[0];
+  double lowest = rig.modal.front().frequency;
+  for (const ModalMode& mode : rig.modal) lowest = std::min(lowest, mode.frequency);
+  return lowest;
+}
+
 AeroelasticModel::AeroelasticModel(Rig rig, Basis basis, IndicialFunction circulation, Circulation build_up)
     : rig_(std::move(rig)), basis_(std::move(basis)), circulation_(std::move(circulation)), build_up_(build_up) {
   // Bounds are what a rig can be, wide: they keep a search physical, they are not prior knowledge.
   if (!rig_.is_modal()) {
     const std::string twist = "Record a run that excites torsion: a rapid step, or a pluck off the pitch axis.";
     parameters_ = {{"normal.stiffness_scale", "1", 1, 1e-3, 1e3, false, {}, Role::stiffness},
-                   {"torsion.stiffness_scale", "1", 1, 1e-3, 1e3, false, twist, Role::stiffness},
+                   {"torsion.stiffness_scale", "1", 1, 1e-3, 1e3, false, twist, Role::stiffness, -1, true},
                    {"normal.damping_ratio", "1", 0.01, 0, 0.9, false, {}, Role::damping},
-                   {"torsion.damping_ratio", "1", 0.02, 0, 0.9, false, twist, Role::damping},
+                   {"torsion.damping_ratio", "1", 0.02, 0, 0.9, false, twist, Role::damping, -1, true},
                    {"apparent_mass_coefficient", "1", 1, 0, 10, false, "Record a free decay in the fluid besides one in air.", Role::mass},
                    {"normal_force_slope", "1/rad", 2 * pi, -20, 50, true, "Record a step of the angle at this speed.", Role::slope}};
     for (Index k = 0; build_up_ == Circulation::free && k < circulation_.amplitude.size(); ++k)
@@ -279,8 +286,11 @@ AeroelasticModel AeroelasticModel::with_effects(const std::vector<std::string>& 
     const Needs needs = effect(rig_, id).needs;
     if (needs != Needs::any_rig && rig_.is_modal()) throw InputError({rig_.file, 0}, "a rig known only as modes", "wanted a beam rig, which the effect " + id + " needs", "Describe its section and chains, or leave the effect out.");
     if (!has(rig_, needs)) throw InputError({rig_.file, 0}, "no sensor of the twist", "wanted one, which the effect " + id + " needs", "Add a [[sensor]] with reads = \"twist\", or leave the effect out.");
+    int place = 0;
     for (Parameter p : effect(rig_, id).parameters_on(rig_)) {
       p.name = id + "." + p.name;
+      p.effect = id;
+      p.place = place++;
       model.parameters_.push_back(p);
     }
     model.effects_.push_back(id);

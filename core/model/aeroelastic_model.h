@@ -27,6 +27,9 @@ struct Parameter {
   std::string advice = {};  ///< what to record where the data do not determine it; empty: said by the role
   Role role = Role::effect;
   int mode = -1;            ///< of a rig known as modes: whose it is, from 0
+  bool torsion = false;     ///< of a beam: of its torsional modes
+  std::string effect = {};  ///< whose it is; empty: the rig's own
+  int place = -1;           ///< among the parameters of that effect, from 0
 };
 
 /// What of a run's conditions enters the model.

@@ -37,7 +37,7 @@ void check_kind(const Run& run, const Rig& rig) {
 /// The gauge must read what the rig's gauge reads. Volts and counts will do for a free decay, whose amplitude is free.
 void check_gauge_unit(const Run& run, const Rig& rig) {
   const Channel& gauge = run.channel("gauge");
-  const std::string wanted = rig.is_modal() ? rig.modal.front().gauge_unit : "N";
+  const std::string wanted = rig.gauge_unit();
   const bool raw = gauge.unit == "V" || gauge.unit == "1";
   if (gauge.unit == wanted || (raw && run.kind == RunKind::pluck)) return;
   throw InputError({run.file, run.header_line}, fmt::format("the column \"gauge\" is in {}", gauge.file_unit),
@@ -83,7 +83,7 @@ Conditions conditions_of(const Run& run) {
 std::vector<std::string> AeroelasticModel::output_channels(const Run& run) const {
   check_kind(run, rig_);
   std::vector<std::string> channels;
-  const bool has_gauge = rig_.is_modal() ? rig_.modal.front().gauge_gain != 0 : rig_.gauge_element > 0;
+  const bool has_gauge = rig_.has_gauge();
   if (has_gauge && run.find("gauge")) channels.emplace_back("gauge");
   std::string wanted = channels.empty() && has_gauge ? "a column 'gauge'" : "";
   for (const Sensor& sensor : rig_.sensors) {

@@ -34,8 +34,7 @@ struct Output {
 /// The gauge and every sensor, whether the run has recorded them or not.
 std::vector<Output> outputs_of(const Rig& rig, const Run& run) {
   std::vector<Output> outputs;
-  if (rig.is_modal() && rig.modal.front().gauge_gain != 0) outputs.push_back({"gauge", rig.modal.front().gauge_unit});
-  if (rig.gauge_element > 0) outputs.push_back({"gauge", "N"});
+  if (rig.has_gauge()) outputs.push_back({"gauge", rig.gauge_unit()});
   for (const Sensor& sensor : rig.sensors) {
     const Channel* recorded = run.find(sensor.column);
     outputs.push_back({sensor.column, recorded ? recorded->unit : sensor.unit});
@@ -76,7 +75,7 @@ Conditions conditions_for(const SimulateProblem& problem) {
     if (run.kind == RunKind::step)
       throw InputError(place, "a release load for a step", "wanted it for a pluck",
                        "A step starts in the steady state of its first angle.");
-    if (!rig.is_modal() && rig.calibration_element == 0)
+    if (!rig.takes_force())
       throw InputError({rig.file, 0}, "the rig has no calibration element for the release load", "wanted [gauge] with calibration_element",
                        "");
     conditions.force = true;

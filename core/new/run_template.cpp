@@ -23,13 +23,6 @@ constexpr double density_of_air = 1.2;  // kg/m^3
 constexpr double speed_of_step = 20;    // m/s
 constexpr double degree = std::numbers::pi / 180;
 
-double lowest_frequency(const Rig& rig) {
-  if (!rig.is_modal()) return coupled_frequencies(rig, make_basis(rig, Index{1}, Index{1}), density_of_air)[0];
-  double lowest = rig.modal.front().frequency;
-  for (const ModalMode& mode : rig.modal) lowest = std::min(lowest, mode.frequency);
-  return lowest;
-}
-
 /// The next rate of the series 1, 2, 5 above 20 samples a period.
 double sampling_rate(double frequency) {
   const double wanted = 20 * frequency, decade = std::pow(10, std::floor(std::log10(wanted)));
@@ -83,7 +76,7 @@ double noise(std::mt19937& generator) {
 
 /// The run with what gauge and sensors would read, all columns with noise of 0.3 % of their range.
 Run recorded(RunKind kind, const Rig& rig) {
-  const double frequency = lowest_frequency(rig), period = 1 / frequency;
+  const double frequency = lowest_frequency(rig, density_of_air), period = 1 / frequency;
   Run run;
   run.file = "the template";
   run.kind = kind;
@@ -93,7 +86,7 @@ Run recorded(RunKind kind, const Rig& rig) {
   const auto samples = static_cast<Index>(std::ceil(40 * period / run.dt));
   add_inputs(kind, period, run, samples);
   if (kind == RunKind::pluck) add_channel(run, "weight", "1", "1", 1, VectorXd::Ones(samples));  // a run has one column at least
-  const Basis basis = rig.is_modal() ? Basis{} : make_basis(rig, 0.5 / run.dt, run.density);
+  const Basis basis = make_basis(rig, 0.5 / run.dt, run.density);
   SimulateProblem problem{{rig, basis, wagner(Wagner::within_1e4)}, {}, run, {}, {}, {}};
   problem.theta = problem.model.start_values();
   if (kind == RunKind::pluck) problem.release_load = 20;

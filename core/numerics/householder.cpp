@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "core/numerics/householder_kernels.h"
+#include "core/numerics/work.h"
 
 namespace unrig {
 
@@ -23,6 +24,7 @@ bool wide() {
 
 Householder::Householder(Eigen::MatrixXd a) : factors_(std::move(a)), coefficients_(std::min(factors_.rows(), factors_.cols())) {
   if (factors_.size() == 0) return;
+  count_work(rows() * coefficients_.size() * (2 * cols() - coefficients_.size()));
 #ifdef UNRIG_WIDE_VECTORS
   if (wide()) {
     factorise_avx2(factors_.data(), rows(), cols(), coefficients_.data());
@@ -36,6 +38,7 @@ Eigen::MatrixXd Householder::triangle() const { return factors_.topRows(coeffici
 
 Eigen::MatrixXd Householder::rotated(Eigen::MatrixXd b) const {
   if (b.size() == 0 || factors_.size() == 0) return b;
+  count_work(2 * rows() * coefficients_.size() * b.cols());
 #ifdef UNRIG_WIDE_VECTORS
   if (wide()) {
     reflect_avx2(factors_.data(), rows(), cols(), coefficients_.data(), b.data(), b.cols());

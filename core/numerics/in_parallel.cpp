@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "core/numerics/time_limit.h"
+#include "core/numerics/work.h"
 
 namespace unrig {
 namespace {
@@ -24,23 +25,54 @@ bool take_one() {
   return false;
 }
 
+/// Puts back what this thread has counted for itself.
+class OwnWork {
+ public:
+  OwnWork() : done_(work::done), most_(work::most), lifted_(work::lifted) {}
+  ~OwnWork() {
+    work::done = done_;
+    work::most = most_;
+    work::lifted = lifted_;
+  }
+  OwnWork(const OwnWork&) = delete;
+  OwnWork& operator=(const OwnWork&) = delete;
+
+ private:
+  std::uint64_t done_, most_;
+  bool lifted_;
+};
+
 }  // namespace
 
 void use_threads(int threads) { idle() = std::max(1, threads) - 1; }
 
-void in_parallel(std::size_t count, const std::function<void(std::size_t)>& work) {
+void in_parallel(std::size_t count, const std::function<void(std::size_t)>& call) {
   std::atomic<std::size_t> next{0};
+  std::atomic<std::uint64_t> done{0};
+  const std::uint64_t left = work::most - std::min(work::done, work::most);
+  TimeLimit::check();
   std::exception_ptr failure;
   std::mutex failing;
+  const auto fail = [&] {
+    const std::lock_guard lock(failing);
+    if (!failure) failure = std::current_exception();
+  };
   const auto worker = [&] {
-    for (std::size_t i = next++; i < count; i = next++) try {
+    const OwnWork own;
+    for (std::size_t i = next++; i < count; i = next++) {
+      work::done = 0;
+      work::most = left;
+      try {
         TimeLimit::check();
-        work(i);
+        call(i);
+      } catch (const OutOfWork&) {  // the other calls are made all the same
+        fail();
       } catch (...) {
-        const std::lock_guard lock(failing);
-        if (!failure) failure = std::current_exception();
+        fail();
         next = count;
       }
+      done += work::done;
+    }
   };
   std::vector<std::thread> others;
   while (others.size() + 1 < count && take_one())
@@ -50,6 +82,7 @@ void in_parallel(std::size_t count, const std::function<void(std::size_t)>& work
     });
   worker();
   for (std::thread& thread : others) thread.join();
+  work::done += done;
   if (failure) std::rethrow_exception(failure);
 }
 

@@ -1,6 +1,7 @@
 #include "core/numerics/small_product.h"
 
 #include "core/numerics/small_product_tiles.h"
+#include "core/numerics/work.h"
 
 namespace unrig {
 
@@ -10,6 +11,7 @@ void small_product_avx2(const double* a, std::ptrdiff_t rows, std::ptrdiff_t inn
 #endif
 
 void small_product(const double* a, Eigen::Index padded_rows, Eigen::Index inner, const double* b, Eigen::Index b_stride, Eigen::Index columns, double* c, Eigen::Index c_stride) {
+  count_work(padded_rows * inner * columns);
 #ifdef UNRIG_WIDE_VECTORS
   static const bool wide = __builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma");
   if (wide) return small_product_avx2(a, padded_rows, inner, b, b_stride, columns, c, c_stride);

@@ -6,6 +6,7 @@
 #include <optional>
 
 #include "core/numerics/small_product.h"
+#include "core/numerics/work.h"
 #include "core/propagate/block_of_steps.h"
 #include "core/propagate/feedback_force.h"
 #include "core/propagate/step_matrices.h"
@@ -37,6 +38,8 @@ class Laws {
   }
   /// At the arguments z of all feedbacks in turn.
   void at(const Few<M>& z) {
+    constexpr int of_a_law = 50;  // about, with the powers in it
+    count_work(of_a_law * static_cast<std::int64_t>(system_.feedback.size()));
     for (std::size_t i = 0; i < system_.feedback.size(); ++i) {
       const Index first = arguments_.first[i], count = system_.feedback[i].sees.rows();
       const FeedbackForce f = force_of(system_.feedback[i], z.data() + first, theta_);

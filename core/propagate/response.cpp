@@ -7,6 +7,8 @@
 
 #include <fmt/format.h>
 
+#include "core/numerics/work.h"
+
 namespace unrig {
 namespace {
 
@@ -133,6 +135,7 @@ Response drive(const LinearSystem& system, const ExactStep& step, const DualMatr
       if (acts(system, j)) active.push_back(j);
   const auto count = static_cast<Index>(active.size());
   const bool has_jerk = jerk.size() > 0, has_input = input.rows() > 0;
+  count_work(samples * n * n * (1 + 2 * count));
 
   // One column for the state, one per parameter for its partial; the partials' own forcing dT x + dJ j + dB u by one stacked product.
   MatrixXd state = MatrixXd::Zero(n, 1 + count), next(n, 1 + count);

@@ -55,7 +55,7 @@ struct Rig {
   int rigid_from = 0;           ///< torsion element (from 1) that carries the normal elements of the same number and all outboard
   std::vector<int> submerged;   ///< normal elements (from 1) that are strips
   double strip_length = 0;      ///< m
-  int gauge_element = 0;        ///< from 1; 0: the rig has no gauge
+  int gauge_element = 0;        ///< from 1; 0: no gauge, or a rig known as modes
   int calibration_element = 0;  ///< from 1
   int loaded_element() const { return calibration_element > 0 ? calibration_element : 1; }  ///< where a single force acts: of a rig without a gauge the first
   double calibration_uncertainty = 0;        ///< of the gauge, relative, one standard deviation
@@ -68,6 +68,11 @@ struct Rig {
   std::vector<std::string> warnings;
 
   bool is_modal() const { return !modal.empty(); }
+  bool has_gauge() const { return gauge_element > 0 || (is_modal() && modal.front().gauge_gain != 0); }
+  /// What the gauge reads in, in SI.
+  std::string gauge_unit() const { return is_modal() ? modal.front().gauge_unit : "N"; }
+  /// Whether it says where a single force acts: on every mode, or at the calibration element.
+  bool takes_force() const { return is_modal() || calibration_element > 0; }
   double semichord() const { return chord / 2; }
   /// Position of the pitch axis in semichords aft of mid-chord (a_h of the seed's Figure 2.2): -1/2 at the quarter chord.
   double axis() const { return 2 * pitch_axis - 1; }

@@ -51,6 +51,7 @@ Modes chain_modes(const Chain& chain) {
 }
 
 Basis make_basis(const Rig& rig, Index normal_modes, Index torsion_modes) {
+  if (rig.is_modal()) return {};
   const Modes normal = chain_modes(rig.normal);
   const Modes torsion = chain_modes(rig.torsion);
   if (normal_modes > normal.omega.size() || torsion_modes > torsion.omega.size())
@@ -75,6 +76,7 @@ Basis make_basis(const Rig& rig, Index normal_modes, Index torsion_modes) {
 }
 
 Basis make_basis(const Rig& rig, double nyquist, double density) {
+  if (rig.is_modal()) return {};
   const Modes normal = chain_modes(rig.normal);
   const Index torsion_modes = wanted_torsion_modes(rig, chain_modes(rig.torsion), nyquist);
   const Index available = normal.omega.size();

@@ -33,13 +33,16 @@ struct Basis {
   Eigen::Index size() const { return normal_modes + torsion_modes; }
 };
 
-/// Basis with the given numbers of modes. Throws std::invalid_argument where the rig has fewer.
+/// Basis with the given numbers of modes; an empty one of a rig that is known as modes. Throws std::invalid_argument where the rig has fewer.
 Basis make_basis(const Rig& rig, Eigen::Index normal_modes, Eigen::Index torsion_modes);
 
 /// The basis the rig file asks for. "all" means: every mode in vacuum below `nyquist` [Hz], and then as many more as it takes until a further
 /// one moves no frequency below `nyquist`, with the apparent mass of a fluid of `density` [kg/m^3], by more than 1e-3 of itself: in a thin
 /// basis of vacuum modes the frequencies in water converge slowly (tests/verification/printed_numbers_test.cpp).
 Basis make_basis(const Rig& rig, double nyquist, double density);
+
+/// The lowest resonance [Hz] as the rig file has it: of a beam with its first modes, in a fluid of `density` [kg/m^3].
+double lowest_frequency(const Rig& rig, double density);
 
 /// Frequencies [Hz] of the coupled rig at rest in a fluid (no damping, speed 0), ascending.
 Eigen::VectorXd coupled_frequencies(const Rig& rig, const Basis& basis, double density, double apparent_mass_coefficient = 1);

@@ -34,9 +34,7 @@ FittedModel fitted_model(const Rig& stated_rig, const FittedRig& fit, const Run&
   const FittedNumbers numbers(fit, stated_rig, stated_run);
   const Rig rig = numbers.rig();
   const Run run = numbers.run();
-  const Basis basis = rig.is_modal()          ? Basis{}
-                      : fit.normal_modes > 0  ? make_basis(rig, fit.normal_modes, fit.torsion_modes)
-                                              : make_basis(rig, 0.5 / run.dt, run.density);
+  const Basis basis = fit.normal_modes > 0 ? make_basis(rig, fit.normal_modes, fit.torsion_modes) : make_basis(rig, 0.5 / run.dt, run.density);
   AeroelasticModel model(with_laws(rig, fit), basis, wagner(fit.circulation));
   if (!fit.effects.empty()) model = model.with_effects(fit.effects);
   const Eigen::VectorXd theta = theta_for(model, fit, run.file, conditions_of(run).onset_angle);

@@ -15,6 +15,7 @@
 #include "core/law/law_effect.h"
 #include "core/rig/fingerprint.h"
 #include "core/numerics/time_limit.h"
+#include "core/numerics/work.h"
 #include "fit/diagnose/as_given.h"
 #include "fit/diagnose/exact_model.h"
 #include "fit/diagnose/explanation.h"
@@ -35,30 +36,34 @@ using Eigen::Index;
 
 constexpr double twice_the_noise = 2;
 
-/// The time that a diagnosis may take, over the parts of it that search [s of the processor]; 0: any.
-class SearchTime {
+/// What a diagnosis may take, over the parts of it that search.
+class SearchLimits {
  public:
-  explicit SearchTime(double limit) : until_(limit > 0 ? processor_seconds() + limit : INFINITY) {}
+  explicit SearchLimits(const DiagnoseProblem& problem) : until_(problem.limit > 0 ? processor_seconds() + problem.limit : INFINITY), most_(problem.work > 0 ? problem.work : INFINITY) {}
 
-  bool is_up() const { return is_up_; }
-  /// Searches unless the time is up; what the search has changed by then stands.
+  bool are_reached() const { return are_reached_; }
+  /// 1e9 multiplications.
+  double work() const { return done_; }
+  /// Searches unless a limit is reached; what the search has changed by then stands.
   void spend(const std::function<void()>& search) {
-    if (is_up_ || std::isinf(until_)) {
-      if (!is_up_) search();
-      return;
-    }
-    const TimeLimit limit(until_);
+    if (are_reached_) return;
+    constexpr double billion = 1e9, any = 1e9;
+    const std::uint64_t before = work_done();
+    const TimeLimit time(until_);
+    const WorkLimit work(static_cast<std::uint64_t>(billion * std::min(any, most_ - done_)));
     try {
       search();
-      is_up_ = TimeLimit::is_lifted();
+      are_reached_ = TimeLimit::is_lifted();
     } catch (const OutOfTime&) {
-      is_up_ = true;
+      are_reached_ = true;
     }
+    done_ += static_cast<double>(work_done() - before) / billion;
+    are_reached_ = are_reached_ || done_ > most_;
   }
 
  private:
-  double until_;
-  bool is_up_ = false;
+  double until_, most_, done_ = 0;
+  bool are_reached_ = false;
 };
 
 /// The fit with nothing missing and every run at its full weight, from where the baseline stands; `thorough`: or from first guesses and the starts around them, as `unrig fit` searches, where that leaves less. Whether it
@@ -122,7 +127,7 @@ void describe(const FitProblem& fit_problem, const Trial& baseline, FoundSet& e,
 /// Whether the search has taken the size of an effect (its first parameter) to zero: another one does its work.
 bool is_idle(const JointProblem& joint, const std::string& id) {
   for (const Unknown& u : joint.unknowns())
-    if (joint.parameter(u).name.starts_with(id + ".")) return u.value == 0;
+    if (joint.parameter(u).effect == id) return u.value == 0;
   return false;
 }
 
@@ -143,7 +148,7 @@ std::vector<MissingEffect> effects_of(const FoundSet& found, const Rig& rig, con
     MissingEffect m{id, probability_of(id, d.ranking), e.equation, is_law_id(id) ? std::string() : e.source, {}};
     m.kind = e.kind;
     for (const FittedParameter& p : found.fit.parameters)
-      if (p.name.starts_with(id + ".")) m.parameters.push_back(p);
+      if (p.effect == id) m.parameters.push_back(p);
     set.push_back(m);
   }
   return set;
@@ -274,12 +279,12 @@ FoundSet laws_beside(const RigDescription& description, const DiagnoseProblem& p
 }
 
 /// The rig's description against the laws that were `found`: with laws `beside` it, as far as these were looked for, where neither explains everything. True where it is the better explanation, then in `found`.
-bool weigh(const DiagnoseProblem& problem, const Setting& files, const Trial& baseline, const RigDescription& description, std::optional<FoundSet> beside, Selection& selection, SearchTime& time, FoundSet& found) {
+bool weigh(const DiagnoseProblem& problem, const Setting& files, const Trial& baseline, const RigDescription& description, std::optional<FoundSet> beside, Selection& selection, SearchLimits& limits, FoundSet& found) {
   const double against_baseline = bic_difference(description.trial, baseline) + description.cost;
   selection.add({{rig_description_id}, description.trial.reduced_chi2(), against_baseline, 0, description.promised});
   if (found.explains() && against_baseline > -decisive) return false;
   FoundSet with = beside ? std::move(*beside) : look_at(problem, files, baseline, {description.problem.get(), &description.heldout}, description.trial, description.cost);
-  if (!with.explains() && !found.explains() && !beside) time.spend([&] { with = laws_beside(description, problem, files, baseline, selection); });
+  if (!with.explains() && !found.explains() && !beside) limits.spend([&] { with = laws_beside(description, problem, files, baseline, selection); });
   const bool laws_named = !found.best.effects.empty() && naming_of(found.best, baseline, found.clean(), found.predicts) == Naming::named;
   if (!with.explains() || (laws_named && bic_difference(found.best, with.best) - with.cost < -decisive)) return false;
   found = std::move(with);
@@ -297,7 +302,7 @@ std::unique_ptr<ExactModel> held_against(const HiddenLaw& hidden, const FitProbl
 Diagnosis diagnose_in_order(const DiagnoseProblem& problem, bool numbers_known) {
   if (!numbers_known && states_errors(problem.rig, problem.runs)) return diagnose_inexact(problem);
   const auto begin = std::chrono::steady_clock::now();
-  SearchTime time(problem.limit);
+  SearchLimits limits(problem);
   const auto tell = [&](const std::string& what) {
     if (problem.progress) problem.progress(what);
   };
@@ -315,12 +320,12 @@ Diagnosis diagnose_in_order(const DiagnoseProblem& problem, bool numbers_known) 
   bool coloured = d.mismatch.found && explained_by_noise(in_colour);
   if (coloured) {
     tell("noise of a colour explains what is left; asking whether effects explain it better");
-    time.spend([&] { coloured = !effects_beat_noise(problem, fit_problem, baseline, in_colour); });
+    limits.spend([&] { coloured = !effects_beat_noise(problem, fit_problem, baseline, in_colour); });
   }
   if (coloured) baseline = std::move(in_colour);
   if (coloured) d.mismatch = locate_mismatch(baseline.arrival.joint);
   std::optional<RigDescription> description;
-  if (d.mismatch.found && !numbers_known) time.spend([&] { description = describe_rig(problem, baseline); });
+  if (d.mismatch.found && !numbers_known) limits.spend([&] { description = describe_rig(problem, baseline); });
   const bool described_already = description && description->left < explained;
   // What a set leaves may be noise that is not white, in which all is to be held against each other anew, or the rig's description.
   const Setting files{&fit_problem, &problem.heldout};
@@ -353,7 +358,7 @@ Diagnosis diagnose_in_order(const DiagnoseProblem& problem, bool numbers_known) 
   std::optional<Laws> laws;
   FoundSet found = look_at(problem, files, baseline, files, baseline, 0);
   if (may_find_laws && !described_already)
-    time.spend([&] {
+    limits.spend([&] {
       tell("looking for a law in the force that is missing");
       laws_tried = search_laws(fit_problem, baseline, baseline, LawSearch::Among::laws_and_forms, *selection);
       if (none_leaves_nothing(laws_tried) && !laws_tried.empty() && !coloured)
@@ -372,17 +377,17 @@ Diagnosis diagnose_in_order(const DiagnoseProblem& problem, bool numbers_known) 
   const auto is_begun = [&](const Trial& t) { return std::none_of(t.effects.begin(), t.effects.end(), is_law_id) && t.excess() < half_of_it * baseline.excess() && bic_difference(t, baseline) < -decisive; };
   std::optional<Trial> begun;
   if (const auto first = std::find_if(laws_tried.begin(), laws_tried.end(), is_begun); first != laws_tried.end()) begun = *first;
-  if (!laws) time.spend([&] { best_set = selection->best_set(noise_or_rig, begun ? &*begun : nullptr); });
+  if (!laws) limits.spend([&] { best_set = selection->best_set(noise_or_rig, begun ? &*begun : nullptr); });
   if (anew) {
     tell("trying what may be missing, in noise of the colour that is left");
     d.mismatch = locate_mismatch(baseline.arrival.joint);
     selection = std::make_unique<Selection>(problem, fit_problem, baseline);
     best_set = baseline;
-    time.spend([&] { best_set = selection->best_set(noise_or_rig); });
+    limits.spend([&] { best_set = selection->best_set(noise_or_rig); });
   }
   if (!problem.verdict_only) d.maps = residual_maps(baseline.arrival.joint, d.mismatch.runs);
   if (!laws) found = look_at(problem, files, baseline, files, std::move(best_set), 0);
-  const bool described = description && weigh(problem, files, baseline, *description, std::move(beside), *selection, time, found);
+  const bool described = description && weigh(problem, files, baseline, *description, std::move(beside), *selection, limits, found);
   if (described && laws) {
     laws.reset();
     fit_problem.rig.laws.clear();
@@ -391,7 +396,7 @@ Diagnosis diagnose_in_order(const DiagnoseProblem& problem, bool numbers_known) 
   if (problem.hidden) exact = held_against(*problem.hidden, described ? *description->problem : fit_problem, described ? description->trial : baseline, *selection, found);
   const bool one_law = found.best.effects.size() == 1 && brings_a_law(found.best);  // forms may be its rivals
   if (may_find_laws && !laws && !described && (!found.explains() || one_law))
-    time.spend([&] {
+    limits.spend([&] {
       tell("looking for the law of what is missing");
       const auto add_beside = [&](const Trial& base) {
         for (Trial& t : search_laws(fit_problem, baseline, base, LawSearch::Among::forms, *selection)) laws_tried.push_back(std::move(t));
@@ -404,7 +409,7 @@ Diagnosis diagnose_in_order(const DiagnoseProblem& problem, bool numbers_known) 
     });
   for (const Trial& t : laws_tried)
     if (exact) exact->hold_against(t);
-  if (time.is_up() && !laws) fit_problem.rig.laws.clear();  // a search that was stopped leaves its forms there
+  if (limits.are_reached() && !laws) fit_problem.rig.laws.clear();  // a search that was stopped leaves its forms there
   const Trial& best = found.best;
   if (exact) d.truth = exact->told(*found.setting.heldout);
   d.ranking = selection->ranking();
@@ -439,7 +444,8 @@ Diagnosis diagnose_in_order(const DiagnoseProblem& problem, bool numbers_known) 
     for (MissingEffect& m : effects_of(found, fit_problem.rig, d)) set.push_back(std::move(m));
     if (laws && !problem.verdict_only) tell_laws(fit_problem, *laws, found, set, d);
   }
-  d.stopped = time.is_up();
+  d.stopped = limits.are_reached();
+  d.work = limits.work();
   d.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
   return d;
 }

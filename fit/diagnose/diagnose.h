@@ -22,6 +22,9 @@ namespace unrig {
 
 constexpr double enough_to_name = 0.97;  ///< share of the excess that effects must remove to be named where something remains
 
+/// What `unrig diagnose` and `unrig trial` allow a search where nothing else is asked [1e9 multiplications].
+constexpr double usual_work = 300;
+
 /// Why the best set of effects is named or not.
 enum class Naming { named, removes_too_little, only_signals, does_not_predict };
 
@@ -47,7 +50,8 @@ struct DiagnoseProblem {
   bool verdict_only = false;          ///< neither maps nor predictions, nor descriptions of the fits, nor the missing force
   std::vector<std::string> effects;   ///< candidates; empty: all that can act in these runs
   bool laws = true;                   ///< where no effect explains the runs and no candidates are named, their law is looked for (fit/laws/law_search.h)
-  double limit = 0;                   ///< processor time after which the search ends with what it has found [s]; 0: none
+  double work = 0;                    ///< counted work after which the search ends with what it has found [1e9 multiplications, core/numerics/work.h]; 0: any
+  double limit = 0;                   ///< the same of processor time [s], which depends on the machine; 0: any
   std::optional<HiddenLaw> hidden;    ///< of a trial: all that is tried is held against it
   std::function<void(const std::string&)> progress;
 };
@@ -110,7 +114,8 @@ struct Diagnosis {
   std::vector<std::shared_ptr<const Effect>> laws;  ///< that are at work in `after`
   std::optional<AgainstTruth> truth;  ///< of a trial
   std::vector<MissingForce> missing_force;  ///< where something is unexplained: what would explain it
-  bool stopped = false;  ///< by the limit of time: sets that were not tried may explain more
+  bool stopped = false;  ///< by a limit: sets that were not tried may explain more
+  double work = 0;       ///< that the search did [1e9 multiplications]
   double seconds = 0;
 };
 
@@ -127,7 +132,8 @@ struct Diagnosis {
 /// with amplitudes of their own in every run), and where runs that were not fitted are predicted better with it than without: those held out or, where there are
 /// none, each fitted run from the others. Otherwise the mismatch is unexplained, and the force is given that would explain it.
 ///
-/// A limit of time ends the search, not the description of what it found. One diagnosis at a time has one: processor time is the process's (core/numerics/time_limit.h).
+/// Limits end the search, not the description of what it found. With a limit of work alone the answer is the same on every machine. One diagnosis at a time has a limit of time: processor time is the process's
+/// (core/numerics/time_limit.h).
 ///
 /// No digit of it depends on the order of the runs (fit/likelihood/run_order.h).
 /// Throws InputError where a run does not belong to the rig.

@@ -40,6 +40,8 @@ void check_recordings(const DiagnoseProblem& problem) {
       throw InputError({run.file, 0}, "--heldout holds the same readings as the run " + fitted->file, "wanted another: a run that was fitted cannot test the prediction", "Leave one of them out.");
 }
 
+constexpr double usual_seconds = 60;  // of a search, where nothing else is asked
+
 }  // namespace
 
 int diagnose_command(int argc, char** argv) {
@@ -53,7 +55,10 @@ int diagnose_command(int argc, char** argv) {
   app.add_option("--effects", ids, "candidates, separated by commas; without it, all that can act in these runs")->delimiter(',')->allow_extra_args(false);
   bool no_law = false;
   app.add_flag("--no-law", no_law, "does not look for a law where no effect explains the runs");
-  app.add_option("--limit", problem.limit, "seconds of processor time after which the search ends with what it has found; without it, none")->check(CLI::PositiveNumber);
+  problem.work = usual_work;
+  problem.limit = usual_seconds;
+  app.add_option("--work", problem.work, "billions of multiplications after which the search ends with what it has found, on every machine the same; inf: any")->check(wrong_with_limit)->capture_default_str();
+  app.add_option("--limit", problem.limit, "the same in seconds of processor time; inf: any")->check(wrong_with_limit)->capture_default_str();
   app.add_option_function<int>("--threads", use_threads, "how many threads to work in; without it, as many as the machine has")->check(CLI::Range(1, 256));
   app.add_option("--fit", fit_output, "writes the winning fit too (fit.json), for simulate and correct");
   app.add_option("-o,--output", output, "result (JSON)")->required();
@@ -97,7 +102,7 @@ int diagnose_command(int argc, char** argv) {
   fmt::print("{}", report(diagnosis));
   for (const Run& run : all)
     if (run.hold) fmt::print("    {}: {}\n", base_name(run.file), said_of(*run.hold));
-  fmt::print("    {:.1f} s\n", diagnosis.seconds);
+  fmt::print("    {:.1f} s, {:.2g}e9 multiplications\n", diagnosis.seconds, diagnosis.work);
   return diagnosis.unexplained ? exit_no_answer : exit_done;
 }
 

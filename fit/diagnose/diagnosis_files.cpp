@@ -130,7 +130,7 @@ std::string verdict(const Diagnosis& d) {
 std::string told_id(const MissingEffect& m) { return m.law ? "law" : m.effect; }
 
 ordered_json law_json(const FoundLaw& found) {
-  ordered_json law = {{"name", found.law.name}, {"acts_on", to_string(found.law.acts_on)}, {"class", found.law.name.starts_with("curve") ? "curve" : found.law.kind()}, {"force", found.law.force_text}};
+  ordered_json law = {{"name", found.law.name}, {"acts_on", to_string(found.law.acts_on)}, {"class", found.law.is_curve() ? "curve" : found.law.kind()}, {"force", found.law.force_text}};
   if (!found.law.memory_text.empty()) law["memory"] = found.law.memory_text;
   law["text"] = found.law.text;
   law["learnt_on"] = learnt_json<ordered_json>(found.law.learnt_on);
@@ -157,7 +157,7 @@ ordered_json effects_json(const std::vector<MissingEffect>& effects) {
       parameters.push_back(one);
     }
     list.push_back({{"effect", told_id(m)}, {"probability", number(m.probability)}, {"equation", m.equation}, {"source", m.source}, {"parameters", parameters}});
-    if (!m.kind.empty()) list.back()["class"] = m.law && m.law->law.name.starts_with("curve") ? "curve" : m.kind;
+    if (!m.kind.empty()) list.back()["class"] = m.law && m.law->law.is_curve() ? "curve" : m.kind;
     if (m.law) list.back()["law"] = law_json(*m.law);
     if (!m.advice.empty()) list.back()["advice"] = m.advice;
   }
@@ -243,6 +243,7 @@ std::string to_json(const Diagnosis& d) {
                        {"ranking", ranking},
                        {"missing_force", forces},
                        {"fit", ordered_json::parse(to_json(d.after, d.laws))}};
+  json["work"] = number(d.work);
   if (d.stopped) json["stopped"] = true;
   return json.dump(2) + "\n";
 }

@@ -5,8 +5,8 @@
 
 namespace unrig {
 
-/// What a reader must know of a diagnosis that its limit of time has stopped.
-inline constexpr const char* stopped_words = "The search ended with its limit of time, not by itself: what was not tried may explain more. Give it more (--limit), or name candidates with --effects.";
+/// What a reader must know of a diagnosis that was stopped.
+inline constexpr const char* stopped_words = "The search ended with its limit of work or of time, not by itself: what was not tried may explain more. Give it more (--work, --limit), or name candidates with --effects.";
 
 /// diagnosis.json (correct/manual/results.md), the winning fit in it as `fit`, the sets that were tried as `ranking`.
 std::string to_json(const Diagnosis& diagnosis);

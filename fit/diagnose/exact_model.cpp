@@ -26,7 +26,7 @@ ExactModel::ExactModel(const HiddenLaw& hidden, const FitProblem& files, const T
 
 AgainstTruth ExactModel::told(const std::vector<Run>& heldout) const {
   AgainstTruth told = told_;
-  for (const Run& run : heldout) told.heldout.push_back(predict_heldout(exact_.arrival, problem_, run).rms);
+  for (const Run& run : heldout) told.heldout.push_back(predict_heldout(exact_.arrival, run).rms);
   return told;
 }
 

@@ -23,8 +23,6 @@ bool follows_decays(const Trial& trial, const Trial& baseline) {
 
 /// What runs that were not fitted are left with, before and after. `best` is of the rig and the runs of `after`.
 std::vector<ImprovedRun> predict_unseen(const Setting& before, const Arrival& baseline, const Setting& after, const Trial& best) {
-  FitProblem after_problem = *after.problem;
-  after_problem.effects = best.effects;
   const std::vector<Run>& runs = before.problem->runs;
   const bool changed = !best.effects.empty() || after.problem != before.problem;
   const bool leave_out = before.heldout->empty() && runs.size() > 1 && changed;
@@ -38,8 +36,8 @@ std::vector<ImprovedRun> predict_unseen(const Setting& before, const Arrival& ba
   in_parallel(unseen.size(), [&](std::size_t i) {
     const std::size_t k = predicted[i];
     const Run& run = leave_out ? runs[k] : (*before.heldout)[k];
-    const HeldoutResidual b = leave_out ? predict_left_out(baseline, *before.problem, k) : predict_heldout(baseline, *before.problem, run);
-    const HeldoutResidual a = leave_out ? predict_left_out(best.arrival, after_problem, k) : predict_heldout(best.arrival, after_problem, (*after.heldout)[k]);
+    const HeldoutResidual b = leave_out ? predict_left_out(baseline, k) : predict_heldout(baseline, run);
+    const HeldoutResidual a = leave_out ? predict_left_out(best.arrival, k) : predict_heldout(best.arrival, (*after.heldout)[k]);
     unseen[i] = {run.file, b.channel, run.channel(b.channel).unit, true, leave_out, b.rms, a.rms, a.noise};
   });
   return unseen;

@@ -27,8 +27,8 @@ double nearest_value(const JointProblem& fitted, const Unknown& wanted, double o
 
 }  // namespace
 
-HeldoutResidual predict_heldout(const Arrival& arrival, const FitProblem& problem, const Run& run) {
-  const auto windows = problem.rig.is_modal() ? std::vector<MotionBasis::Window>{} : motion_windows(run);
+HeldoutResidual predict_heldout(const Arrival& arrival, const Run& run) {
+  const auto windows = motion_windows(run);
   std::vector<RunResidual> one;
   one.emplace_back(*arrival.model, run, windows);
   JointProblem joint(*arrival.model, std::move(one));
@@ -60,7 +60,7 @@ HeldoutResidual predict_heldout(const Arrival& arrival, const FitProblem& proble
   return result;
 }
 
-HeldoutResidual predict_left_out(const Arrival& arrival, const FitProblem& problem, std::size_t run) {
+HeldoutResidual predict_left_out(const Arrival& arrival, std::size_t run) {
   const JointProblem& all = arrival.joint;
   std::vector<std::size_t> others;
   for (std::size_t r = 0; r < all.runs().size(); ++r)
@@ -74,7 +74,7 @@ HeldoutResidual predict_left_out(const Arrival& arrival, const FitProblem& probl
   options.precision = 0.3;
   options.most_evaluations = 15;
   solve(without, options);
-  return predict_heldout(without, problem, all.runs()[run].run());
+  return predict_heldout(without, all.runs()[run].run());
 }
 
 }  // namespace unrig

@@ -14,9 +14,9 @@ struct HeldoutResidual {
 
 /// Predicts `run` with all shared parameters held where `arrival` left them. What belongs to the run alone is its own: motion, initial state, zero, lift slope and
 /// the amplitudes of the effects' signals.
-HeldoutResidual predict_heldout(const Arrival& arrival, const FitProblem& problem, const Run& run);
+HeldoutResidual predict_heldout(const Arrival& arrival, const Run& run);
 
 /// The fit without one of its runs, from where it stands, and that run predicted as if it had never been seen.
-HeldoutResidual predict_left_out(const Arrival& arrival, const FitProblem& problem, std::size_t run);
+HeldoutResidual predict_left_out(const Arrival& arrival, std::size_t run);
 
 }  // namespace unrig

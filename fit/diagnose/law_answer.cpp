@@ -23,7 +23,7 @@ bool is_undetermined(const FitProblem& problem, const Trial& set) {
   Arrival arrival = set.arrival;
   const FitResult fit = describe_fit(arrival, with, Settle::nothing);
   return std::any_of(set.effects.begin(), set.effects.end(), [&](const std::string& id) {
-    const auto is_own = [&](const FittedParameter& p) { return p.name.starts_with(id + "."); };
+    const auto is_own = [&](const FittedParameter& p) { return p.effect == id; };
     const auto is_known = [&](const FittedParameter& p) { return is_own(p) && p.identified; };
     return std::any_of(fit.parameters.begin(), fit.parameters.end(), is_own) && std::none_of(fit.parameters.begin(), fit.parameters.end(), is_known);
   });

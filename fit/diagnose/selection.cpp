@@ -61,7 +61,7 @@ bool plausible(const Trial& trial) {
     const Parameter& p = joint.parameter(u);
     const auto [lower, upper] = bounds_at(joint.model(), u.parameter, u.value);
     const auto at = [&](double bound) { return bound != 0 && std::abs(u.value - bound) < 1e-6 * std::abs(bound); };
-    return !u.held && p.name.starts_with(trial.effects.back() + ".") && (at(lower) || at(upper));
+    return !u.held && p.effect == trial.effects.back() && (at(lower) || at(upper));
   });
 }
 

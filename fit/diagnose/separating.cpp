@@ -89,7 +89,7 @@ VectorXd gauge(const Arrival& arrival, std::size_t r, const Variation& v) {
 
 std::optional<SeparatingRecording> separating_recording(const Arrival& one, const Arrival& other) {
   const Rig& rig = one.model->rig();
-  if (rig.is_modal() || rig.gauge_element == 0 || rig.calibration_element == 0) return {};
+  if (rig.gauge_element == 0) return {};
   constexpr double clearly = 2, noise = 1;
   std::optional<SeparatingRecording> best;
   for (std::size_t r = 0; r < one.joint.runs().size(); ++r) {

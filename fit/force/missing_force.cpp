@@ -208,7 +208,7 @@ std::vector<MissingForce> missing_forces(const JointProblem& joint) {
     const RunResidual& run = joint.runs()[r];
     const Rig& rig = joint.model().rig();
     if (run.is_aside()) return;  // what the model leaves of it is no force but a trajectory that was not found
-    if (run.channels().front() != "gauge" || (!rig.is_modal() && rig.calibration_element == 0)) return;
+    if (run.channels().front() != "gauge" || !rig.takes_force()) return;
     const VectorXd theta = joint.theta(r);
     Conditions conditions = run.conditions();
     if (conditions.mount || conditions.force) return;  // driven already

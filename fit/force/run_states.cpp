@@ -23,7 +23,7 @@ std::vector<RunState> run_states(const RunResidual& run, const RunResidual::Pred
   std::vector<std::string> names{"displacement", "velocity"};
   MatrixXd reads(2, system.states());
   reads << displacement_of(system, shape), rate_of(system, shape);
-  if (!rig.is_modal() && basis.torsion_modes > 0) {
+  if (basis.torsion_modes > 0) {
     RowVectorXd twist = RowVectorXd::Zero(system.coordinates);
     twist[basis.normal_modes] = basis.twist(rig.submerged.back() - 1, basis.normal_modes);
     reads.conservativeResize(4, Eigen::NoChange);

@@ -52,7 +52,7 @@ InexactRig::Candidate InexactRig::moved(const Arrival& from, const Step& step, d
   problem->start = stated_->start;
   problem->progress = stated_->progress;
   const Basis& basis = from.model->basis();
-  AeroelasticModel model(problem->rig, problem->rig.is_modal() ? Basis{} : make_basis(problem->rig, basis.normal_modes, basis.torsion_modes), from.model->circulation());
+  AeroelasticModel model(problem->rig, make_basis(problem->rig, basis.normal_modes, basis.torsion_modes), from.model->circulation());
   if (!problem->effects.empty()) model = model.with_effects(problem->effects);
   const auto shared = std::make_shared<const AeroelasticModel>(std::move(model));
   std::vector<RunResidual> runs;

@@ -90,7 +90,7 @@ class SystemSlopes {
     rig.gauge_filters.clear();
     rig.laws.clear();
     const Basis& basis = at_.model->basis();
-    Basis own = rig.is_modal() ? Basis{} : make_basis(rig, basis.normal_modes, basis.torsion_modes);
+    Basis own = make_basis(rig, basis.normal_modes, basis.torsion_modes);
     return {std::move(rig), std::move(own), at_.model->circulation()};
   }
 

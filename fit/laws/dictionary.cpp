@@ -172,7 +172,7 @@ Reach reach_of(const BesideUnknownForces& beside) {
       reach.x = std::max(reach.x, most(displacement_of(system, shape)));
       reach.v = std::max(reach.v, most(rate_of(system, shape)));
       const Basis& basis = run.model().basis();
-      if (!run.model().rig().is_modal() && basis.torsion_modes > 0) {
+      if (basis.torsion_modes > 0) {
         RowVectorXd twist = RowVectorXd::Zero(system.coordinates);
         twist[basis.normal_modes] = basis.twist(run.model().rig().submerged.back() - 1, basis.normal_modes);
         reach.twist = std::max(reach.twist, most(displacement_of(system, twist)));
@@ -191,7 +191,7 @@ Reach reach_of(const BesideUnknownForces& beside) {
   if (reach.x > 0) reach.a = reach.v * reach.v / reach.x;
   reach.force = per_second * reach.v;
   const Rig& rig = joint.model().rig();
-  if (!rig.is_modal() && joint.model().basis().torsion_modes > 0 && reach.twist > 0) {
+  if (joint.model().basis().torsion_modes > 0 && reach.twist > 0) {
     const Basis& basis = joint.model().basis();
     const double shape = basis.twist(rig.submerged.back() - 1, basis.normal_modes);
     const double omega = reach.twist_rate / reach.twist;

@@ -10,10 +10,12 @@
 namespace unrig {
 namespace {
 
-/// The law with its parameters at these values, as far as there are any, and learnt where these runs went.
-Law at_values(Law law, const std::function<const double*(const std::string&)>& value_of, const std::map<std::string, LearntOn>& reach) {
-  for (Parameter& p : law.parameters)
-    if (const double* value = value_of(law.id() + "." + p.name); value && std::isfinite(*value)) p.start = std::clamp(*value, p.lower, p.upper);
+/// The law with its parameters at these values, infinite where there is none, and learnt where these runs went.
+Law at_values(Law law, const std::vector<double>& values, const std::map<std::string, LearntOn>& reach) {
+  for (std::size_t k = 0; k < law.parameters.size(); ++k) {
+    Parameter& p = law.parameters[k];
+    if (std::isfinite(values[k])) p.start = std::clamp(values[k], p.lower, p.upper);
+  }
   if (const auto learnt_on = reach.find(law.id()); learnt_on != reach.end()) law.learnt_on = learnt_on->second;
   law.text = law_text(law);
   return law;
@@ -22,12 +24,11 @@ Law at_values(Law law, const std::function<const double*(const std::string&)>& v
 }  // namespace
 
 FoundLaw found_law(const Rig& rig, const std::string& id, const FitResult& fit) {
-  const auto value_of = [&](const std::string& name) -> const double* {
-    for (const FittedParameter& p : fit.parameters)
-      if (p.name == name) return &p.value;
-    return nullptr;
-  };
-  return {at_values(law_of(effect(rig, id)), value_of, fit.learnt_on), {}};
+  const Law law = law_of(effect(rig, id));
+  std::vector<double> values(law.parameters.size(), INFINITY);
+  for (const FittedParameter& p : fit.parameters)
+    if (p.effect == id) values[static_cast<std::size_t>(p.place)] = p.value;
+  return {at_values(law, values, fit.learnt_on), {}};
 }
 
 std::vector<Rival> rivals(const std::vector<Trial>& tried, const std::function<bool(const Trial&)>& leaves_something) {
@@ -39,12 +40,11 @@ std::vector<Rival> rivals(const std::vector<Trial>& tried, const std::function<b
     const Effect& e = effect(t.arrival.joint.model().rig(), t.effects.back());
     Rival rival{t.effects, e.equation, "", "", std::sqrt(std::max(0.0, deviance_difference(t, tried.front()))), 0.5 * behind};
     if (is_law_id(e.id)) {
-      const auto value_of = [&](const std::string& name) -> const double* {
-        for (const Unknown& u : t.arrival.joint.unknowns())
-          if (t.arrival.joint.parameter(u).name == name) return &u.value;
-        return nullptr;
-      };
-      const Law law = at_values(law_of(e), value_of, reach_of_laws(t.arrival.joint));
+      const Law starts = law_of(e);
+      std::vector<double> values(starts.parameters.size(), INFINITY);
+      for (const Unknown& u : t.arrival.joint.unknowns())
+        if (const Parameter& p = t.arrival.joint.parameter(u); p.effect == e.id) values[static_cast<std::size_t>(p.place)] = u.value;
+      const Law law = at_values(starts, values, reach_of_laws(t.arrival.joint));
       rival.force = law.force_text;
       rival.memory = law.memory_text;
       rival.text = law.text;

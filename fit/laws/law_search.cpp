@@ -38,11 +38,9 @@ bool is_among(const std::vector<std::string>& ids, const std::string& id) { retu
 
 /// Where the parameters of a form stand; those that no run asks for at its first start.
 Eigen::VectorXd values_of(const JointProblem& joint, const Form& form, const std::string& id) {
-  const Law& law = form.law;
   Eigen::VectorXd values = form.starts.front();
   for (const Unknown& u : joint.unknowns())
-    for (std::size_t k = 0; k < law.parameters.size(); ++k)
-      if (joint.parameter(u).name == id + "." + law.parameters[k].name) values[static_cast<Eigen::Index>(k)] = u.value;
+    if (const Parameter& p = joint.parameter(u); p.effect == id) values[p.place] = u.value;
   return values;
 }
 

@@ -67,7 +67,7 @@ Port port_of(const RunResidual& run, const VectorXd& theta, ActsOn place) {
   port.reads.row(0) = displacement_of(s, shape);
   port.reads.row(1) = rate_of(s, shape);
   const Basis& basis = model.basis();
-  if (!rig.is_modal() && basis.torsion_modes > 0) {
+  if (basis.torsion_modes > 0) {
     RowVectorXd twist = RowVectorXd::Zero(s.coordinates);
     twist[basis.normal_modes] = basis.twist(rig.submerged.back() - 1, basis.normal_modes);
     port.reads.row(2) = displacement_of(s, twist);

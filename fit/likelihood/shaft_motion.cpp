@@ -12,7 +12,6 @@ using Eigen::Index;
 using Eigen::VectorXd;
 
 std::optional<ShaftMotion> shaft_motion(const Rig& rig, const Run& run) {
-  if (rig.is_modal() || run.kind != RunKind::step || !run.find("alpha")) return std::nullopt;
   const std::vector<MotionBasis::Window> windows = motion_windows(run);
   if (windows.empty() || windows.front().stride > 1) return std::nullopt;
   const VectorXd measured = run.channel("alpha").value;

@@ -130,13 +130,6 @@ void add_turns(const Limits& limits, const std::vector<Run>& runs, std::vector<C
   }
 }
 
-double lowest_frequency(const Rig& rig, double density) {
-  if (!rig.is_modal()) return coupled_frequencies(rig, make_basis(rig, Index{1}, Index{1}), density)[0];
-  double lowest = rig.modal.front().frequency;
-  for (const ModalMode& mode : rig.modal) lowest = std::min(lowest, mode.frequency);
-  return lowest;
-}
-
 /// Tones through half to twice the lowest frequency, as evenly in time as a linear sweep has them.
 void add_sweeps(const Limits& limits, const Rig& rig, const std::vector<Run>& runs, std::vector<CandidateRun>& all) {
   for (const Medium& medium : media_of(limits, runs)) {
@@ -174,12 +167,12 @@ void add_repeats(const std::vector<Run>& runs, std::vector<CandidateRun>& all) {
 std::vector<CandidateRun> candidate_runs(const Limits& limits, const Rig& rig, const std::vector<Run>& runs) {
   const bool has_step = std::any_of(runs.begin(), runs.end(), [](const Run& run) { return run.kind == RunKind::step; });
   std::vector<CandidateRun> all;
-  if (limits.pluck_load && (rig.is_modal() || rig.calibration_element > 0)) add_plucks(limits, runs, all);
+  if (limits.pluck_load && rig.takes_force()) add_plucks(limits, runs, all);
   if (limits.angle && !rig.is_modal()) {
     if (!has_step && !limits.angle_noise) throw InputError({limits.file, 0}, "turns of the shaft, and no step at hand shows how noisy its angle is", "wanted angle_noise = \"0.01 deg\"", "");
     add_turns(limits, runs, all);
   }
-  if (limits.force && (rig.is_modal() || rig.calibration_element > 0)) add_sweeps(limits, rig, runs, all);
+  if (limits.force && rig.takes_force()) add_sweeps(limits, rig, runs, all);
   if (all.empty()) throw InputError({limits.file, 0}, "no run within these limits is possible with this rig", "wanted pluck_load or force, or angles with a rate at which the record is long enough", "Rigs of modes have no turns; plucks and forces need [gauge] with calibration_element.");
   add_repeats(runs, all);
   return all;

@@ -22,7 +22,7 @@ using Eigen::VectorXd;
 namespace {
 
 /// Whether one more run may move it: parameters of effects that the runs at hand leave open too.
-bool may_move(const JointProblem& joint, const Unknown& u) { return !u.held || belongs_to_an_effect(joint.parameter(u).name); }
+bool may_move(const JointProblem& joint, const Unknown& u) { return !u.held || !joint.parameter(u).effect.empty(); }
 
 const Unknown* find(const std::vector<Unknown>& unknowns, Index parameter, int run) {
   const auto found = std::find_if(unknowns.begin(), unknowns.end(), [&](const Unknown& u) { return u.parameter == parameter && u.run == run; });

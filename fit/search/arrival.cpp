@@ -19,10 +19,6 @@
 
 namespace unrig {
 
-bool belongs_to_an_effect(const std::string& parameter) {
-  return is_law_id(parameter) || std::any_of(effects().begin(), effects().end(), [&](const Effect& e) { return parameter.starts_with(e.id + "."); });
-}
-
 JointProblem make_joint(const AeroelasticModel& model, const std::vector<Run>& runs, const std::vector<std::vector<MotionBasis::Window>>& windows, Eigen::Index horizon) {
   std::vector<RunResidual> residuals;
   for (std::size_t r = 0; r < runs.size(); ++r) residuals.emplace_back(model, runs[r], windows[r], RunOptions{horizon});
@@ -94,12 +90,12 @@ constexpr double followed_chi2 = 2;  // reduced chi-square of a record that a mo
 /// resonance nearby still moves.
 void spread(JointProblem& joint, double torsion, double others) {
   constexpr double wide = 0.03;  // a resonance three per cent wide to either side
-  const auto even_mode = [](const std::string& name) { return name.starts_with("modal[") && (std::stoi(name.substr(6)) % 2 == 0); };
   for (Unknown& u : joint.unknowns()) {
-    const std::string& name = joint.parameter(u).name;
-    if (u.held || name.find("stiffness") == std::string::npos || belongs_to_an_effect(name)) continue;
-    u.value = std::clamp(u.value * (name.starts_with("torsion") || even_mode(name) ? torsion : others), joint.parameter(u).lower, joint.parameter(u).upper);
-    if (!name.starts_with("modal[")) continue;
+    const Parameter& p = joint.parameter(u);
+    if (u.held || p.role != Role::stiffness) continue;
+    const bool every_second = p.mode % 2 == 1;
+    u.value = std::clamp(u.value * (p.torsion || every_second ? torsion : others), p.lower, p.upper);
+    if (p.mode < 0) continue;
     const VectorXd theta = joint.theta(0);
     for (Unknown& damping : joint.unknowns())
       if (damping.parameter == u.parameter + 1 && !damping.held) damping.value = std::max(damping.value, 2 * wide * std::sqrt(u.value * theta[u.parameter - 1]));
@@ -220,7 +216,7 @@ bool back_to_the_rig(JointProblem& joint, double factor) {
   for (Unknown& u : joint.unknowns()) {
     const double there = rig[u.parameter];
     const bool near = u.value > there / factor && u.value < factor * there;
-    if (u.held || u.run >= 0 || !(there > 0) || near || belongs_to_an_effect(joint.parameter(u).name)) continue;
+    if (u.held || u.run >= 0 || !(there > 0) || near || !joint.parameter(u).effect.empty()) continue;
     u.value = there;
     any = true;
   }
@@ -230,7 +226,7 @@ bool back_to_the_rig(JointProblem& joint, double factor) {
 std::vector<Unknown*> unknowns_of(JointProblem& joint, const std::string& id) {
   std::vector<Unknown*> own;
   for (Unknown& u : joint.unknowns())
-    if (joint.parameter(u).name.starts_with(id + ".")) own.push_back(&u);
+    if (joint.parameter(u).effect == id) own.push_back(&u);
   return own;
 }
 
@@ -243,7 +239,7 @@ void solve(Arrival& arrival, const JointProblem::SolveOptions& options) {
 
 Arrival arrive(const FitProblem& problem, const std::shared_ptr<const AeroelasticModel>& model, const ArrivalEffort& effort) {
   Windows windows;
-  for (const Run& run : problem.runs) windows.push_back(problem.rig.is_modal() ? std::vector<MotionBasis::Window>{} : motion_windows(run));
+  for (const Run& run : problem.runs) windows.push_back(motion_windows(run));
   const Arrival start = first_guess(problem, model, windows, problem.start);
   Arrival arrival = problem.rig.is_modal() ? arrive_at_modes(start, problem, effort) : grow(start, problem, effort);
   hold_undetermined(arrival.joint);
@@ -259,7 +255,7 @@ Arrival arrive(const FitProblem& problem, const std::shared_ptr<const Aeroelasti
 Arrival arrive_with_effects(const FitProblem& problem, const Arrival& like, const ArrivalEffort& effort) {
   std::map<std::string, double> starts = problem.start;
   for (const Unknown& u : like.joint.unknowns())
-    if (const std::string& name = like.joint.parameter(u).name; belongs_to_an_effect(name)) starts.emplace(name, u.value);
+    if (const Parameter& p = like.joint.parameter(u); !p.effect.empty()) starts.emplace(p.name, u.value);
   Arrival arrival = grow(first_guess(problem, like.model, like.windows, starts), problem, effort);
   hold_undetermined(arrival.joint);
   return arrival;

@@ -53,8 +53,6 @@ void refine(Arrival& arrival, const FitProblem& problem);
 /// may have taken a resonance of another, beside which its own is small.
 void look_elsewhere(Arrival& arrival);
 
-/// Whether a parameter of this name is some effect's.
-bool belongs_to_an_effect(const std::string& parameter);
 
 /// A fit that cannot follow leaves parameters far from the truth: the rig's own that are further than `factor` from their first values go back there. Whether any did.
 /// A parameter of a single run (the normal-force slope, which falls to half in stall) stays.

@@ -280,7 +280,7 @@ void leave_out_terms(Trial& trial) {
       Trial fewer = trial;
       for (Unknown& u : fewer.arrival.joint.unknowns())
         for (const Index k : term) {
-          if (fewer.arrival.joint.parameter(u).name != id + "." + e.parameters[static_cast<std::size_t>(k)].name) continue;
+          if (const Parameter& p = fewer.arrival.joint.parameter(u); p.effect != id || p.place != static_cast<int>(k)) continue;
           if (k == term.front()) u.value = 0;
           u.held = true;
           u.why_held = "These runs are explained as well without its term";

@@ -104,7 +104,7 @@ FirstOrder::Promise FirstOrder::promise(const JointProblem& with, const std::str
   std::vector<Unknown> of_effect;
   std::vector<Index> own;  // their parameters, each once
   for (const Unknown& u : with.unknowns()) {
-    if (!with.parameter(u).name.starts_with(id + ".")) continue;
+    if (with.parameter(u).effect != id) continue;
     of_effect.push_back(u);
     if (std::find(own.begin(), own.end(), u.parameter) == own.end()) own.push_back(u.parameter);
   }

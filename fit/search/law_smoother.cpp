@@ -7,6 +7,7 @@
 
 #include "core/model/run_inputs.h"
 #include "core/numerics/triangularise.h"
+#include "core/numerics/work.h"
 #include "core/propagate/feedback_force.h"
 
 namespace unrig {
@@ -216,6 +217,7 @@ LawSmoother::Information LawSmoother::information(const VectorXd& theta, const V
   best_disturbance_.resize(static_cast<std::size_t>(steps));
   // What all later samples say: of the state behind the step over [x | change | offsets | right], and of [change | offsets | right] beside any state.
   const Index beside = changes_ + channels_ + 1;
+  count_work(2 * steps * n * n * (n + u + beside));  // beside those of triangularise
   MatrixXd later = MatrixXd::Zero(n, n + beside), known = MatrixXd::Zero(beside + channels_ * stack, beside);
   MatrixXd rows(n + u + channels_, u + n + beside);
   RowVectorXd row(all + 1);

@@ -49,10 +49,7 @@ JointProblem best_of(const std::vector<JointProblem>& starts, double without, bo
 }
 
 void set_values(JointProblem& joint, const std::string& id, const VectorXd& values) {
-  const std::vector<Parameter>& parameters = effect(joint.model().rig(), id).parameters_on(joint.model().rig());
-  for (Unknown* u : unknowns_of(joint, id))
-    for (std::size_t k = 0; k < parameters.size(); ++k)
-      if (joint.parameter(*u).name == id + "." + parameters[k].name) u->value = values[static_cast<Index>(k)];
+  for (Unknown* u : unknowns_of(joint, id)) u->value = values[joint.parameter(*u).place];
 }
 
 JointProblem back_at_the_rig(const JointProblem& joint) {

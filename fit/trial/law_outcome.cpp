@@ -34,7 +34,7 @@ double power_of(const ToldLaw& a, const ToldLaw& b) {
 ToldLaw told(const MissingEffect& m) {
   if (m.law) return told(m.law->law);
   ToldLaw all{m.effect, m.kind, m.equation, ""};
-  for (const FittedParameter& p : m.parameters) all.parameters.push_back({p.name.substr(p.name.find('.') + 1), p.unit, p.value});
+  for (const FittedParameter& p : m.parameters) all.parameters.push_back({p.name.substr(m.effect.size() + 1), p.unit, p.value});
   return all;
 }
 
@@ -90,7 +90,7 @@ bool within(const LawOutcome& o) {
 }  // namespace
 
 ToldLaw told(const Law& law) {
-  ToldLaw all{law.id(), law.name.starts_with("curve") ? "curve" : law.kind(), law.force_text, law.memory_text};
+  ToldLaw all{law.id(), law.is_curve() ? "curve" : law.kind(), law.force_text, law.memory_text};
   for (const Parameter& p : law.parameters) all.parameters.push_back({p.name, p.unit, p.start});
   for (std::size_t s = 0; s < symbol_count; ++s)
     if (law.scales[s] != 1) all.scales.emplace(symbol_names[s], law.scales[s]);

@@ -124,6 +124,8 @@ void take_verdict(const Diagnosis& d, TrialOutcome& outcome) {
   outcome.mismatch = d.mismatch.found;
   outcome.unexplained = d.unexplained;
   outcome.seconds = d.seconds;
+  outcome.work = d.work;
+  outcome.stopped = d.stopped;
   for (const Candidate& c : d.ranking)
     if (!outcome.found.empty() && name_of(c.effects) == name_of(outcome.found)) outcome.probability = c.probability;
 }
@@ -135,6 +137,7 @@ void try_effects(const TrialProblem& problem, const Strings& effects, std::mt199
   diagnosis.runs = campaign.runs;
   if (!problem.effects.empty() || problem.outside) diagnosis.effects = effects;
   diagnosis.verdict_only = true;
+  diagnosis.work = problem.work;
   if (problem.outside) std::erase_if(diagnosis.effects, [&](const std::string& id) { return has(outcome.hidden, id); });
   take_verdict(diagnose(diagnosis), outcome);
 }
@@ -149,6 +152,7 @@ void try_law(const TrialProblem& problem, std::mt19937_64& random, TrialOutcome&
   diagnosis.rig.laws.clear();
   diagnosis.runs.assign(campaign.runs.begin(), first_heldout);
   diagnosis.heldout.assign(first_heldout, campaign.runs.end());
+  diagnosis.work = problem.work;
   diagnosis.hidden = HiddenLaw{planned.rig.laws.back(), campaign.truth};
   const Diagnosis d = diagnose(diagnosis);
   take_verdict(d, outcome);

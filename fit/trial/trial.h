@@ -23,6 +23,7 @@ struct TrialProblem {
   bool outside = false;              ///< what is hidden is not among the candidates, or no law that the dictionary can say: nothing should be named, or a curve
   bool laws = false;                 ///< hide a law in every campaign (fit/trial/hidden_law.h), which a full diagnosis with two further runs held out looks for; no `effects`
   bool ideal = false;                ///< white noise, exact files and steady signals instead of what a laboratory adds (fit/trial/laboratory.h)
+  double work = usual_work;          ///< of each diagnosis at most (DiagnoseProblem::work); none is stopped by time
   unsigned seed = 1;
   std::vector<Run> recordings;       ///< whose conditions, motion, sampling and noise the simulated runs repeat; none: runs are drawn
   std::optional<double> noise;       ///< of the gauge [N]; without it that of the recordings, or 0.03; of laws 0.03 to 0.3, drawn
@@ -45,7 +46,8 @@ struct TrialOutcome {
   std::optional<double> probability;  ///< that the diagnosis gives what it found; none where nothing is named
   bool mismatch = false, unexplained = false;
   std::optional<LawOutcome> law;  ///< of a campaign with a law
-  double seconds = 0;
+  double seconds = 0, work = 0;  ///< that the diagnosis took, and Diagnosis::work
+  bool stopped = false;          ///< Diagnosis::stopped
   std::string failure;         ///< what the diagnosis threw, if it did
 
   bool right() const;          ///< exactly what was hidden was found; beside it, where files are misread, the rig's description may be

@@ -178,7 +178,7 @@ SimulateProblem problem_of(const AeroelasticModel& model, const VectorXd& theta,
 }
 
 void check_for_trials(const Rig& rig) {
-  if (rig.is_modal() || rig.gauge_element == 0 || rig.calibration_element == 0 || rig.submerged.empty())
+  if (rig.gauge_element == 0 || rig.submerged.empty())
     throw InputError({rig.file, 0}, "the rig cannot be plucked and pitched", "wanted a beam rig with a gauge, a calibration element and a submerged section", "");
 }
 

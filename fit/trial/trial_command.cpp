@@ -29,6 +29,7 @@ int trial_command(int argc, char** argv) {
   CLI::Option* const effects = app.add_option("--effects", ids, "effects to hide in turn, and the candidates, separated by commas; without it, all")->delimiter(',')->allow_extra_args(false);
   app.add_option("--trials", problem.trials, "campaigns; every so many-th hides nothing")->capture_default_str()->check(CLI::Range(1, 1000000));
   CLI::Option* const pairs = app.add_flag("--pairs", problem.pairs, "hide two effects at a time");
+  app.add_option("--work", problem.work, "billions of multiplications after which each search ends with what it has found; inf: any")->check(wrong_with_limit)->capture_default_str();
   app.add_option("--seed", problem.seed, "of the random numbers")->capture_default_str();
   app.add_option("--noise", noise, "standard deviation of the gauge's noise; without it that of the recordings, or 0.03 N; with --law drawn from 0.03 to 0.3 N");
   app.add_flag("--outside", problem.outside, "keep what is hidden from the candidates: the right verdict is `unexplained`; with --law, hide laws that the dictionary cannot say");

@@ -29,6 +29,8 @@ ordered_json json_of(const TrialOutcome& o, bool seconds) {
   one["misread"] = o.misread.empty() ? ordered_json(nullptr) : ordered_json(o.misread);
   one["probability"] = o.probability ? ordered_json(*o.probability) : ordered_json(nullptr);
   if (o.law) one["law"] = json_of(*o.law);
+  one["work"] = o.work;
+  if (o.stopped) one["stopped"] = true;
   if (seconds) one["seconds"] = o.seconds;
   if (!o.failure.empty()) one["failure"] = o.failure;
   return one;
@@ -49,6 +51,8 @@ TrialOutcome outcome_of(const ordered_json& json) {
   if (const ordered_json& misread = json.at("misread"); !misread.is_null()) misread.get_to(o.misread);
   if (const ordered_json& probability = json.at("probability"); !probability.is_null()) o.probability = probability.get<double>();
   if (json.contains("law")) o.law = law_outcome_of(json.at("law"));
+  o.work = json.value("work", 0.0);
+  o.stopped = json.value("stopped", false);
   o.seconds = json.value("seconds", 0.0);
   o.failure = json.value("failure", std::string());
   return o;

@@ -7,12 +7,9 @@
 namespace unrig {
 namespace {
 
-constexpr std::string_view participation = ".mount_participation";
-
 const FittedParameter* mass_of(const FittedParameter& p, const std::vector<FittedParameter>& parameters) {
-  const std::string name = p.name.substr(0, p.name.size() - participation.size()) + ".mass";
   for (const FittedParameter& other : parameters)
-    if (other.name == name) return &other;
+    if (other.mode == p.mode && other.role == Role::mass) return &other;
   return nullptr;
 }
 
@@ -22,7 +19,7 @@ std::vector<std::string> out_of_proportion(const std::vector<FittedParameter>& p
   constexpr double largest = 10;
   std::vector<std::string> sentences;
   for (const FittedParameter& p : parameters) {
-    if (!p.name.ends_with(participation)) continue;
+    if (p.mode < 0 || p.role != Role::load) continue;  // how far the mount drives its mode
     const FittedParameter* mass = mass_of(p, parameters);
     const double error = std::isfinite(p.std_error) ? p.std_error : 0;
     if (!mass || !(std::abs(p.value) - error > largest * mass->value)) continue;

@@ -71,13 +71,12 @@ double start_of(const Parameter& parameter, const StartValues& starts) {
 /// The least damping ratio that a decay in these runs can show, 1 / (omega T): less leaves no mark over the longest of them.
 double least_visible_damping(const JointProblem& joint, const Parameter& p) {
   const Basis& basis = joint.model().basis();
-  const bool torsion = p.name.starts_with("torsion");
-  if ((torsion ? basis.torsion_modes : basis.normal_modes) == 0) return 0;
+  if ((p.torsion ? basis.torsion_modes : basis.normal_modes) == 0) return 0;
   double longest = 0, scale = 1;
   for (const RunResidual& run : joint.runs()) longest = std::max(longest, run.run().dt * static_cast<double>(run.run().samples()));
   for (const Unknown& u : joint.unknowns())
-    if (joint.parameter(u).name == (torsion ? "torsion.stiffness_scale" : "normal.stiffness_scale")) scale = u.value;
-  return 1 / (std::sqrt(scale) * basis.omega[torsion ? basis.normal_modes : 0] * longest);
+    if (const Parameter& other = joint.parameter(u); other.role == Role::stiffness && other.torsion == p.torsion) scale = u.value;
+  return 1 / (std::sqrt(scale) * basis.omega[p.torsion ? basis.normal_modes : 0] * longest);
 }
 
 /// A standard error that says the runs do not determine the unknown. The damping of a mode that is hardly excited is where a resonance is mistaken for

@@ -24,18 +24,23 @@ struct Resonance {
   double error_of_stiffness() const { return std::sqrt(covariance(0, 0)); }
 };
 
-std::optional<Resonance> resonance(const JointProblem& joint, const ParameterUncertainty& uncertainty, const std::string& modes) {
+/// Of a beam.
+std::optional<Resonance> resonance(const JointProblem& joint, const ParameterUncertainty& uncertainty, bool torsion) {
+  const auto is_its = [&](const Unknown& u, Role role) {
+    const Parameter& p = joint.parameter(u);
+    return p.mode < 0 && p.role == role && p.torsion == torsion;
+  };
   Resonance found;
   std::vector<Index> rows;
-  for (const char* name : {".stiffness_scale", ".damping_ratio"})
+  for (const Role role : {Role::stiffness, Role::damping})
     for (std::size_t a = 0; a < uncertainty.free.size(); ++a) {
       const auto i = static_cast<std::size_t>(uncertainty.free[a]);
-      if (joint.parameter(joint.unknowns()[i]).name == modes + name) found.unknowns.push_back(i), rows.push_back(static_cast<Index>(a));
+      if (is_its(joint.unknowns()[i], role)) found.unknowns.push_back(i), rows.push_back(static_cast<Index>(a));
     }
-  if (found.unknowns.empty() || !joint.parameter(joint.unknowns()[found.unknowns.front()]).name.ends_with("stiffness_scale")) return std::nullopt;
+  if (found.unknowns.empty() || joint.parameter(joint.unknowns()[found.unknowns.front()]).role != Role::stiffness) return std::nullopt;
   found.covariance = uncertainty.white_covariance(rows, rows);
   for (const Unknown& u : joint.unknowns())
-    if (joint.parameter(u).name == modes + ".damping_ratio") found.damping = u.value;
+    if (is_its(u, Role::damping)) found.damping = u.value;
   return found;
 }
 
@@ -45,7 +50,7 @@ bool is_loud(const JointProblem& joint, const Resonance& r) {
   constexpr double part = 0.2;
   const Unknown& stiffness = joint.unknowns()[r.unknowns.front()];
   const Basis& basis = joint.model().basis();
-  const bool torsion = joint.parameter(stiffness).name.starts_with("torsion");
+  const bool torsion = joint.parameter(stiffness).torsion;
   const double highest = std::sqrt(stiffness.value) * basis.omega.segment(torsion ? basis.normal_modes : 0, torsion ? basis.torsion_modes : basis.normal_modes).maxCoeff();
   double longest = 0;
   for (const RunResidual& run : joint.runs()) longest = std::max(longest, run.run().dt * static_cast<double>(run.run().samples()));
@@ -104,8 +109,8 @@ bool hold_unheard(JointProblem& joint, const ParameterUncertainty& uncertainty, 
   for (const RunResidual& run : joint.runs()) freedom += run.is_aside() ? 0 : static_cast<double>(run.degrees_of_freedom());
   const double variance = std::max(1.0, joint.chi2() / freedom);
   bool held = false;
-  for (const std::string modes : {"normal", "torsion"}) {
-    const std::optional<Resonance> r = resonance(joint, uncertainty, modes);
+  for (const bool torsion : {false, true}) {
+    const std::optional<Resonance> r = resonance(joint, uncertainty, torsion);
     if (!r || is_loud(joint, *r)) continue;
     const std::string with = elsewhere(joint, *r, starts, variance);
     if (with.empty()) continue;

@@ -88,6 +88,10 @@ TEST(SearchFailed, TheDiagnosisSaysWhatFailed) {
 
 TEST(OutOfProportion, AParticipationOfAMillionModalMassesGetsAWord) {
   std::vector<FittedParameter> parameters(4);
+  for (std::size_t k = 0; k < parameters.size(); ++k) {
+    parameters[k].mode = static_cast<int>(k / 2);
+    parameters[k].role = k % 2 == 0 ? Role::mass : Role::load;
+  }
   parameters[0].name = "modal[1].mass";
   parameters[0].value = 2;
   parameters[1].name = "modal[1].mount_participation";

@@ -59,7 +59,7 @@ struct Campaign {
 TEST(Heldout, ARunIsPredictedWithTheParametersOfTheOthers) {
   const Campaign campaign({decay("fitted.csv", one_mode::hertz, 1)});
   const unrig::Run like = decay("like.csv", one_mode::hertz, 2), other = decay("other.csv", stiffer * one_mode::hertz, 3);
-  const HeldoutResidual of_like = predict_heldout(campaign.arrival, campaign.problem, like), of_other = predict_heldout(campaign.arrival, campaign.problem, other);
+  const HeldoutResidual of_like = predict_heldout(campaign.arrival, like), of_other = predict_heldout(campaign.arrival, other);
   EXPECT_EQ(of_like.channel, "gauge");
   EXPECT_NEAR(of_like.noise, noise, 0.1 * noise);  // 500 samples tell it to 5 %
   EXPECT_NEAR(of_like.rms, left_by(one_mode::hertz, like.channel("gauge").value), 1e-6 * of_like.rms);
@@ -70,7 +70,7 @@ TEST(Heldout, ARunIsPredictedWithTheParametersOfTheOthers) {
 
 TEST(Heldout, ARunThatIsLeftOutHasNoPartInTheFitThatPredictsIt) {
   const Campaign campaign({decay("a.csv", one_mode::hertz, 1), decay("b.csv", one_mode::hertz, 2), decay("stiffer.csv", stiffer * one_mode::hertz, 3)});
-  const HeldoutResidual left_out = predict_left_out(campaign.arrival, campaign.problem, 2);
+  const HeldoutResidual left_out = predict_left_out(campaign.arrival, 2);
   // The others tell the frequency to 1e-5 of it. With a third of the say in it the run would pull it by a third of the way, and be left with two thirds.
   const double expected = left_by(one_mode::hertz, campaign.problem.runs[2].channel("gauge").value);
   EXPECT_NEAR(left_out.rms, expected, 0.01 * expected);
