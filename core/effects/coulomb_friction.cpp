@@ -32,8 +32,10 @@ Effect coulomb_friction() {
   e.parameters = {{"force", "N", 0, 0, 1e4, false, small_motions}, {"velocity", "m/s", 1e-3, 1e-6, 1, false, small_motions}};
   e.starts = {Eigen::Vector2d(0.1, 1e-3)};
   e.starts_for = [](const AeroelasticModel& model, double fastest) -> std::vector<Eigen::VectorXd> {  // as much as a damping ratio near 0.01
-    const double momentum = first_mode_momentum(model);
-    return {Eigen::Vector2d(0.01 * momentum * fastest, 0.02 * fastest), Eigen::Vector2d(0.01 * momentum * fastest, 0.002 * fastest)};
+    const double force = 0.01 * first_mode_momentum(model) * fastest;
+    std::vector<Eigen::VectorXd> starts;
+    for (const double share : {0.06, 0.02, 0.006, 0.002}) starts.emplace_back(Eigen::Vector2d(force, share * fastest));
+    return starts;
   };
   e.draw = [](const AeroelasticModel& model, double release, Effect::Random& random) -> Eigen::VectorXd {  // beside the load that releases the pluck, and the speed it gives
     const double fastest = release / first_mode_momentum(model);

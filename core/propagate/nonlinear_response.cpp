@@ -47,13 +47,13 @@ class Laws {
       for (Index a = 0; a < count; ++a) slope[first + a] = f.slope[static_cast<std::size_t>(a)];
     }
   }
-  /// d force / d theta at z, feedbacks x P.
-  void partials_at(const Few<M>& z, Eigen::Ref<MatrixXd> partials) const {
+  /// d force / d theta at z, feedbacks x those parameters that are carried. `place`: of each among these.
+  void partials_at(const Few<M>& z, const std::vector<Index>& place, Eigen::Ref<MatrixXd> partials) const {
     partials.setZero();
     for (std::size_t i = 0; i < system_.feedback.size(); ++i) {
       const Feedback& f = system_.feedback[i];
       const FeedbackForce at_z = force_of(f, z.data() + arguments_.first[i], theta_);
-      for (Index k = 0; k < f.parameters; ++k) partials(static_cast<Index>(i), f.first_parameter + k) = at_z.partial[static_cast<std::size_t>(k)];
+      for (Index k = 0; k < f.parameters; ++k) partials(static_cast<Index>(i), place[static_cast<std::size_t>(f.first_parameter + k)]) = at_z.partial[static_cast<std::size_t>(k)];
     }
   }
   Few<M> force;  ///< of each feedback
@@ -122,8 +122,12 @@ class Follower {
         laws_(system, arguments_, theta),
         one_(system, exact, arguments_, partials == Partials::all ? system.A.parameters() : 0),
         directions_(drive.start_tangent.cols()),
+        carried_(parameters_that_act(system)),
         gain_(one_.late.middleRows(one_.argument(), one_.arguments)),
-        by_argument_(gain_(Eigen::all, arguments_.owner)) {}
+        by_argument_(gain_(Eigen::all, arguments_.owner)) {
+    place_.assign(static_cast<std::size_t>(one_.parameters), -1);
+    for (std::size_t a = 0; a < carried_.size(); ++a) place_[static_cast<std::size_t>(carried_[a])] = static_cast<Index>(a);
+  }
 
   NonlinearResponse run() {
     begin();
@@ -131,25 +135,44 @@ class Follower {
       const Index count = std::min(most_at_a_time, steps_ - first);
       march(first, count);
       if (directions_ > 0 && response_.finite) carry_directions(first, count);
-      if (one_.parameters > 0 && response_.finite) carry_parameters(first, count);
+      if (carried() > 0 && response_.finite) carry_parameters(first, count);
       now_.col(0) = now_.col(count);
       slope_.col(0) = slope_.col(count);
     }
     response_.largest_argument = largest_;
     response_.end = now_.col(0).head(one_.states);
-    response_.end_tangent.resize(one_.states, directions_ + one_.parameters);
-    response_.end_tangent << work_.changes.topLeftCorner(directions_, one_.states).transpose(), tangent_.topRows(one_.states);
+    response_.end_tangent = MatrixXd::Zero(one_.states, directions_ + one_.parameters);
+    response_.end_tangent.leftCols(directions_) = work_.changes.topLeftCorner(directions_, one_.states).transpose();
+    for (Index a = 0; a < carried(); ++a) response_.end_tangent.col(column(a)) = tangent_.col(a).head(one_.states);
     return std::move(response_);
   }
 
  private:
   static constexpr Index most_at_a_time = 256;
 
+  /// Those of which anything in the step, the laws or the start depends.
+  std::vector<Index> parameters_that_act(const LinearSystem& system) const {
+    std::vector<char> acts(static_cast<std::size_t>(one_.parameters), 0);
+    if (one_.parameters > 0)
+      for (const Feedback& f : system.feedback)
+        for (Index k = 0; k < f.parameters; ++k) acts[static_cast<std::size_t>(f.first_parameter + k)] = 1;
+    for (const StepMatrices::Partial& p : one_.partials) acts[static_cast<std::size_t>(p.parameter)] = 1;
+    std::vector<Index> carried;
+    for (Index j = 0; j < one_.parameters; ++j) {
+      const bool begins = drive_.start_partial.size() > 0 && !drive_.start_partial.col(j).isZero(0);
+      if (acts[static_cast<std::size_t>(j)] || begins || arguments_.sees.depends_on(j) || arguments_.sees_input.depends_on(j)) carried.push_back(j);
+    }
+    return carried;
+  }
+  Index carried() const { return static_cast<Index>(carried_.size()); }
+  /// Of a carried parameter in the tangents of the response.
+  Index column(Index a) const { return directions_ + carried_[static_cast<std::size_t>(a)]; }
+
   void begin() {
     const Index n = one_.states, m = one_.feedbacks, block = std::min(most_at_a_time, steps_);
     response_.output.resize(samples_, one_.channels);
     const Index columns = directions_ + one_.parameters;
-    response_.tangent.assign(static_cast<std::size_t>(columns > 0 ? one_.channels : 0), MatrixXd(samples_, columns));
+    response_.tangent.assign(static_cast<std::size_t>(columns > 0 ? one_.channels : 0), MatrixXd::Zero(samples_, columns));
     now_ = MatrixXd::Zero(one_.inputs() + m, block + 1);
     slope_ = MatrixXd::Zero(one_.arguments, block + 1);
     stepped_ = VectorXd::Zero(one_.rows());
@@ -157,8 +180,8 @@ class Follower {
     now_.col(0).head(n) = drive_.start;
     now_.col(0).segment(one_.force(), m) = laws_.force;
     slope_.col(0) = laws_.slope;
-    law_partial_ = MatrixXd::Zero(m, one_.parameters * (block + 1));
-    if (one_.parameters > 0) laws_.partials_at(z_, law_partials(0));
+    law_partial_ = MatrixXd::Zero(m, carried() * (block + 1));
+    if (carried() > 0) laws_.partials_at(z_, place_, law_partials(0));
     largest_ = VectorXd::Zero(m);
     start_tangents();
   }
@@ -175,14 +198,14 @@ class Follower {
   }
 
   void start_tangents() {
-    const Index n = one_.states, m = one_.feedbacks, P = one_.parameters;
-    MatrixXd start = MatrixXd::Zero(n, directions_ + P);
+    const Index n = one_.states, m = one_.feedbacks, p = carried();
+    MatrixXd start = MatrixXd::Zero(n, directions_ + p);
     if (directions_ > 0) start.leftCols(directions_) = drive_.start_tangent;
-    if (P > 0 && drive_.start_partial.size() > 0) start.rightCols(P) = drive_.start_partial;
+    if (p > 0 && drive_.start_partial.size() > 0) start.rightCols(p) = drive_.start_partial(Eigen::all, carried_);
     const MatrixXd force = force_tangents(start);
-    tangent_.resize(n + m, P);
-    tangent_ << start.rightCols(P), force.rightCols(P);
-    next_.resize(one_.rows(), P);
+    tangent_.resize(n + m, p);
+    tangent_ << start.rightCols(p), force.rightCols(p);
+    next_.resize(one_.rows(), p);
     work_.changes.resize(0, n);
     if (directions_ == 0) return;
     const bool jerks = drive_.jerk_tangent.size() > 0;
@@ -193,23 +216,24 @@ class Follower {
 
   /// Of the forces where the stretch begins: df = slope dz + partial, dz = sees dx + dsees x + the same of inputs and forces.
   MatrixXd force_tangents(const MatrixXd& state) {
-    const Index m = one_.feedbacks, P = one_.parameters;
+    const Index m = one_.feedbacks;
     MatrixXd seen = arguments_.sees.value * state, partial = MatrixXd::Zero(m, state.cols());
-    partial.rightCols(P) = law_partials(0);
+    partial.rightCols(carried()) = law_partials(0);
     const auto own = of_each<MatrixXd>(slope_.col(0));
     if (!arguments_.accelerations) return own * seen + partial;
     VectorXd inputs(one_.measured + m);
     if (one_.measured > 0) inputs.head(one_.measured) = drive_.input.row(0).transpose();
     inputs.tail(m) = laws_.force;
-    for (Index j = 0; j < P; ++j) {
-      if (arguments_.sees.depends_on(j)) seen.col(directions_ + j) += arguments_.sees.d(j) * drive_.start;
-      if (arguments_.sees_input.depends_on(j)) seen.col(directions_ + j) += arguments_.sees_input.d(j) * inputs;
+    for (Index a = 0; a < carried(); ++a) {
+      const Index j = carried_[static_cast<std::size_t>(a)];
+      if (arguments_.sees.depends_on(j)) seen.col(directions_ + a) += arguments_.sees.d(j) * drive_.start;
+      if (arguments_.sees_input.depends_on(j)) seen.col(directions_ + a) += arguments_.sees_input.d(j) * inputs;
     }
     const MatrixXd answer = MatrixXd::Identity(m, m) - own * arguments_.sees_input.value.rightCols(m);
     return answer.partialPivLu().solve(own * seen + partial);
   }
 
-  auto law_partials(Index k) { return law_partial_.middleCols(k * one_.parameters, one_.parameters); }
+  auto law_partials(Index k) { return law_partial_.middleCols(k * carried(), carried()); }
 
   /// The response itself; leaves v and the force at the end of every step in now_, the laws' slopes in slope_.
   void march(Index first, Index count) {
@@ -234,7 +258,7 @@ class Follower {
         largest_[i] = std::max(largest_[i], std::abs(z));
       }
       slope_.col(k + 1) = laws_.slope;
-      if (one_.parameters > 0) laws_.partials_at(z_, law_partials(k + 1));
+      if (carried() > 0) laws_.partials_at(z_, place_, law_partials(k + 1));
       if (!next.head(n).allFinite()) {
         response_.finite = false;
         return;
@@ -277,15 +301,16 @@ class Follower {
 
   /// The tangents in the parameters over the same steps: dx' = step dv + dstep v + late df + dlate f, df = slope dz + partial, where dz is solved for.
   void carry_parameters(Index first, Index count) {
-    const Index n = one_.states, m = one_.feedbacks, p = one_.parameters, rows = one_.rows();
+    const Index n = one_.states, m = one_.feedbacks, p = carried(), rows = one_.rows();
     source_.resize(rows, static_cast<Index>(one_.partials.size()) * count);
     for (std::size_t i = 0; i < one_.partials.size(); ++i)
       small_product(one_.partials[i].both.data(), rows, now_.rows(), now_.data(), now_.rows(), count, source_.col(static_cast<Index>(i) * count).data(), rows);
     for (Index k = 0; k < count; ++k) {
       small_product(one_.step.data(), rows, one_.jerk(), tangent_.data(), tangent_.rows(), p, next_.data(), next_.rows());
-      for (std::size_t i = 0; i < one_.partials.size(); ++i) next_.col(one_.partials[i].parameter) += source_.col(static_cast<Index>(i) * count + k);
+      for (std::size_t i = 0; i < one_.partials.size(); ++i) next_.col(place_[static_cast<std::size_t>(one_.partials[i].parameter)]) += source_.col(static_cast<Index>(i) * count + k);
       if ((first + k) % per_sample_ == 0)
-        for (Index c = 0; c < one_.channels; ++c) response_.tangent[static_cast<std::size_t>(c)].row((first + k) / per_sample_).tail(p) = next_.row(one_.output() + c);
+        for (Index c = 0; c < one_.channels; ++c)
+          for (Index a = 0; a < p; ++a) response_.tangent[static_cast<std::size_t>(c)]((first + k) / per_sample_, column(a)) = next_(one_.output() + c, a);
       next_ += one_.late.lazyProduct(law_partials(k + 1));
       const FewSquare<M> answer = answer_to(slope_.col(k + 1));
       for (Index j = 0; j < p; ++j) {
@@ -321,13 +346,14 @@ class Follower {
   Laws<M> laws_;
   StepMatrices one_;
   Index directions_;
+  std::vector<Index> carried_, place_;  // parameters whose tangents are carried, and of each parameter where among them
   FewSquare<M> gain_;         // arguments x feedbacks: how the force at the end of a step moves what the laws see there
   FewSquare<M> by_argument_;  // the same for each argument's feedback
   FewSquare<M> inverse_;      // of 1 - by_argument_ slope, at a step before
   NonlinearResponse response_;
   MatrixXd now_;  // of each step v, and f at its end
   MatrixXd slope_, law_partial_, source_;
-  MatrixXd tangent_, next_;  // of [x; f] in the parameters, and the rows of a step
+  MatrixXd tangent_, next_;  // of [x; f] in the carried parameters, and the rows of a step
   std::optional<BlockOfSteps> block_, last_block_;
   BlockOfSteps::Work work_;
   VectorXd stepped_, largest_;

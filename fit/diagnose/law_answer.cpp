@@ -34,7 +34,9 @@ bool is_undetermined(const FitProblem& problem, const Trial& set) {
 bool none_leaves_nothing(const std::vector<Trial>& tried) { return std::all_of(tried.begin(), tried.end(), leaves_something); }
 
 std::vector<Trial> search_laws(FitProblem& fit_problem, const Trial& baseline, const Trial& base, LawSearch::Among among, Selection& selection) {
-  std::vector<Trial> tried = LawSearch(fit_problem, base, leaves_something, is_noise, among).search();
+  LawSearch search(fit_problem, base, leaves_something, is_noise, among);
+  std::vector<Trial> tried = search.search();
+  if (base.effects.empty()) selection.know(search.take_screened());
   for (const Trial& t : tried) selection.add({t.effects, t.reduced_chi2(), bic_difference(t, baseline), 0, 0});
   return tried;
 }

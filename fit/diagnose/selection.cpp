@@ -35,9 +35,10 @@ void fit_linear(Trials& trials) {
   in_parallel(std::min(trials.size(), most_in_full), [&](std::size_t i) { fit_fully(trials[i], 6); });
 }
 
-/// Those that were `fitted`: laws by the free decays first, the most promising effect first; none after one that leaves nothing of a mismatch too large for two laws to explain alike.
-void fit_nonlinear(const FitProblem& problem, const Tell& tell, Trials& trials, const Trial& base, Trials& fitted) {
+/// Those that were `fitted`, behind `others`: laws by the free decays first, the most promising effect first; none after one that leaves nothing of a mismatch too large for two laws to explain alike.
+void fit_nonlinear(const FitProblem& problem, const Tell& tell, Trials& trials, const Trial& base, const Trials& others, Trials& fitted) {
   double least = base.reduced_chi2();
+  for (const Trial& other : others) least = std::min(least, other.reduced_chi2());
   for (Trial& trial : trials) {
     if (tell) tell(fmt::format("trying {}", fmt::join(trial.effects, " with ")));
     hold_undetermined(trial);
@@ -155,16 +156,29 @@ Strings Selection::candidates(const Strings& at_work, const Strings& hopeless) c
   return ids;
 }
 
+/// Each of `ids` beside `base`.
+std::vector<std::unique_ptr<Trial>> Selection::screened_beside(const Trial& base, const Strings& ids) {
+  std::vector<std::unique_ptr<Trial>> prepared(ids.size());
+  std::vector<std::size_t> unknown;
+  for (std::size_t i = 0; i < ids.size(); ++i) {
+    const auto known = std::find_if(screened_.begin(), screened_.end(), [&](const Trial& t) { return t.effects == Strings{ids[i]}; });
+    if (base.effects.empty() && known != screened_.end()) prepared[i] = std::make_unique<Trial>(std::move(*known));
+    else unknown.push_back(i);
+  }
+  screened_.clear();
+  if (unknown.empty()) return prepared;
+  const Screening screening(fit_problem_, base.arrival);
+  in_parallel(unknown.size(), [&](std::size_t k) {
+    Strings set = base.effects;
+    set.push_back(ids[unknown[k]]);
+    prepared[unknown[k]] = std::make_unique<Trial>(screened(fit_problem_, screening, base, set));
+  });
+  return prepared;
+}
+
 /// The best of all sets that have one effect more than `base`: all of them by one linear step, the promising ones in full.
 Trials Selection::try_one_more(const Trial& base, const Strings& hopeless) {
-  const Strings ids = candidates(base.effects, hopeless);
-  const Screening screening(fit_problem_, base.arrival);
-  std::vector<std::unique_ptr<Trial>> prepared(ids.size());
-  in_parallel(ids.size(), [&](std::size_t i) {
-    Strings set = base.effects;
-    set.push_back(ids[i]);
-    prepared[i] = std::make_unique<Trial>(screened(fit_problem_, screening, base, set));
-  });
+  std::vector<std::unique_ptr<Trial>> prepared = screened_beside(base, candidates(base.effects, hopeless));
   std::sort(prepared.begin(), prepared.end(), [](const auto& a, const auto& b) { return a->score > b->score; });
   const double best_score = prepared.empty() ? 0 : prepared.front()->score;
   Trials linear, others, unpromising;
@@ -195,7 +209,7 @@ Trials Selection::try_one_more(const Trial& base, const Strings& hopeless) {
     }
     if (!done || !favours_linear) {  // a decaying tone may leave nothing of what a weak drag does, and explain it worse
       if (done) std::erase_if(others, [&](const Trial& t) { return by_linear >= t.score; });
-      fit_nonlinear(fit_problem_, problem_.progress, others, base, followed);
+      fit_nonlinear(fit_problem_, problem_.progress, others, base, linear, followed);
       done = done || any_leaves_nothing(followed);
       if (!done && !favours_linear) fit_anew(fit_problem_, linear);
       const bool decays_have_told = has_decays(base.arrival.joint);  // from first guesses nonlinear laws are not found where their decays do not lead

@@ -1,5 +1,6 @@
 #pragma once
 #include <functional>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -34,6 +35,9 @@ class Selection {
   /// Something else takes this share of chi-square: a law that promises less than half of that does not come out ahead, and is not fitted.
   void hold_laws_against(double share) { taken_ = share; }
 
+  /// Effects as they were screened beside the baseline elsewhere, each by itself.
+  void know(std::vector<Trial> screened) { screened_ = std::move(screened); }
+
   /// Whether the search ended because its time was up (core/numerics/time_limit.h), which is lifted then.
   bool stopped() const { return stopped_; }
   /// Sets that were fitted in rounds from which the search went on.
@@ -51,6 +55,7 @@ class Selection {
   /// Whether nothing has been found beside them.
   bool is_first(const Trial& base) const { return base.effects.size() == lines_.size(); }
   std::vector<std::string> candidates(const std::vector<std::string>& at_work, const std::vector<std::string>& hopeless) const;
+  std::vector<std::unique_ptr<Trial>> screened_beside(const Trial& base, const std::vector<std::string>& ids);
   std::vector<Trial> try_one_more(const Trial& base, const std::vector<std::string>& hopeless);
   Trial without_superfluous(Trial trial);
   void try_with_all_modes(std::vector<Trial>& tried);
@@ -64,7 +69,7 @@ class Selection {
   const DiagnoseProblem& problem_;
   const FitProblem& fit_problem_;
   const Trial& baseline_;
-  std::vector<Trial> tried_;
+  std::vector<Trial> tried_, screened_;
   std::vector<Candidate> ranking_;
   std::vector<std::string> lines_;  // signals at frequencies known beforehand that were taken out first
   bool stopped_ = false;

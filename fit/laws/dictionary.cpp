@@ -56,7 +56,7 @@ std::vector<Line> lines() {
       {"damping with the amplitude", ActsOn::normal, "-c * abs(x)^p * v", "", {falling, power(2)}, {x, v}},
       {"damping of van der Pol", ActsOn::normal, "c * (1 - (x / s)^2) * v", "", {damped, {"s", In::x, {0.3, 0.8}, 0.02, 20}}, {v}},
       {"spring with the speed squared", ActsOn::normal, "-c * x * v^2", "", {either}, {x, v}},
-      {"dry friction", ActsOn::normal, "-f * tanh(v / s)", "", {{"f", In::force, {little}, 0}, {"s", In::v, {0.02}, 1e-3, 2}}, {}},
+      {"dry friction", ActsOn::normal, "-f * tanh(v / s)", "", {{"f", In::force, {little}, 0}, {"s", In::v, {0.02}, 1e-3, 2}}, {}, "coulomb-friction"},
       {"friction of Stribeck", ActsOn::normal, "-f * (1 + r * exp(-abs(v) / s)) * tanh(v / (0.1 * s))", "", {{"f", In::force, {little}, 0}, {"r", In::number, {0.3}, -1, 10}, {"s", In::v, {0.05}, 5e-3, 2}}, {}},
       {"hysteresis of Bouc and Wen", ActsOn::normal, "-f * z", "v / xy * (1 - abs(z)^n * (b + (1 - abs(b)) * sign(v * z)))", {{"f", In::force, {more}, 0}, {"xy", In::x, {0.2, 0.05}, 1e-3, 3}, {"b", In::number, {0.5}, -1, 1}, {"n", In::number, {1}, 0.5, 4}}, {}, "bouc-wen"},
       {"spring and damper in series", ActsOn::normal, "-f * z", "v - z / tau", {{"f", In::force, {10 * more}, 0}, {"tau", In::seconds, {0.01, 0.1}, 1e-4, 1}}, {v}},
@@ -208,6 +208,13 @@ std::vector<Form> dictionary(const Rig& rig, const Reach& reach) {
     if (moved(line, reach) && !(needs_section && rig.is_modal())) forms.push_back(put(line, reach));
   }
   return forms;
+}
+
+std::vector<std::string> listed_forms() {
+  std::vector<std::string> ids;
+  for (const Line& line : lines())
+    if (*line.listed != 0) ids.emplace_back(line.listed);
+  return ids;
 }
 
 std::vector<Eigen::Index> coefficients_of(const Law& law) {

@@ -31,6 +31,8 @@ Reach reach_of(const BesideUnknownForces& beside);
 /// pull across two gaps; damping that grows or falls with amplitude; dry friction, with Stribeck's decrease; hysteresis of Bouc and Wen (Dahl's with b = 0), a Maxwell element; mass that changes with amplitude; stiffness and damping that change with time,
 /// angle or speed; lift that bends; last, curves without a formula of their own. Those that nothing in these runs would move are left out.
 std::vector<Form> dictionary(const Rig& rig, const Reach& reach);
+/// Ids of the effects of the list that its forms are.
+std::vector<std::string> listed_forms();
 
 /// Parameters in which the force of a law of the dictionary is linear: those called c, c2 ... , f and k.
 std::vector<Eigen::Index> coefficients_of(const Law& law);

@@ -114,47 +114,99 @@ std::vector<std::string> LawSearch::of_the_list(const Trial& base) const {
   return ids;
 }
 
-/// Those of `ids` that are worth a fit beside `base`: laws that promise the share `least` of what the best of all promises, and none where a signal promises more than any law. `known`: what was asked about before.
-LawSearch::Prospects LawSearch::prospects(const Trial& base, const std::vector<std::string>& ids, const Promised& known, double least) const {
+/// Each of `ids` beside `base`.
+std::vector<Trial> LawSearch::screened_beside(const Trial& base, const std::vector<std::string>& ids) const {
   const Screening screening(problem_, base.arrival);
   std::vector<std::optional<Trial>> trials(ids.size());
-  std::vector<char> is_law(ids.size());
   in_parallel(ids.size(), [&](std::size_t i) {
     std::vector<std::string> set = base.effects;
     set.push_back(ids[i]);
     trials[i] = screened(problem_, screening, base, set);
-    is_law[i] = brings_a_law(*trials[i]);
   });
+  std::vector<Trial> screened;
+  for (std::optional<Trial>& trial : trials) screened.push_back(std::move(*trial));
+  return screened;
+}
+
+/// Those that are worth a fit beside `base`: laws that promise the share `least` of what the best of all promises, and none where a signal promises more than any law. `known`: what was asked about before.
+LawSearch::Prospects LawSearch::prospects(const Trial& base, std::vector<Trial> screened, const Promised& known, double least) const {
+  std::vector<char> is_law;
   Prospects found{{}, known};
-  for (std::size_t i = 0; i < ids.size(); ++i) {
-    double& most = is_law[i] ? found.promised.by_a_law : found.promised.by_a_signal;
-    most = std::max(most, trials[i]->score);
+  for (const Trial& trial : screened) {
+    is_law.push_back(brings_a_law(trial));
+    double& most = is_law.back() ? found.promised.by_a_law : found.promised.by_a_signal;
+    most = std::max(most, trial.score);
   }
   const bool all = among_ == Among::forms, any = found.promised.by_a_law >= found.promised.by_a_signal;
-  for (std::size_t i = 0; i < ids.size(); ++i)
-    if ((all || (any && is_law[i] && trials[i]->score >= least * found.promised.by_a_law)) && may_be_seen(*trials[i], base)) found.laws.push_back(std::move(*trials[i]));
+  for (std::size_t i = 0; i < screened.size(); ++i)
+    if ((all || (any && is_law[i] && screened[i].score >= least * found.promised.by_a_law)) && may_be_seen(screened[i], base)) found.laws.push_back(std::move(screened[i]));
   return found;
 }
 
-/// Fitted in full, those that are worth it.
+/// Forms that may explain what laws of the list do not, or as well. Of one that leaves nothing of a mismatch too large for two laws to explain alike only what promises more with no more parameters is a rival.
+LawSearch::Prospects LawSearch::rivals(const Promised& promised, const std::vector<Trial>& tried) {
+  const bool none = base_.reduced_chi2() > nearly_explained && std::any_of(tried.begin(), tried.end(), [&](const Trial& t) { return !leaves_something_(t); });
+  Prospects forms = prospects(base_, screened_beside(base_, forms_worth_a_fit(base_)), promised, none ? 1 : half_of_it);
+  const auto parameters = [&](const Trial& t) { return effect(problem_.rig, t.effects.back()).parameters_on(problem_.rig).size(); };
+  if (none) std::erase_if(forms.laws, [&](const Trial& t) { return parameters(t) > parameters(tried.front()); });
+  return forms;
+}
+
+/// By the free decays; runs that are driven from first guesses, in full.
+void LawSearch::follow_decays(Trial& trial, const Trial& base) const {
+  hold_undetermined(trial);
+  if (all_driven(base.arrival.joint)) follow_nonlinear(problem_, trial, base, INFINITY);
+  else if (nonlinear(trial)) trial.ruled_out = !fit_decays_first(trial, base, shows_in_decays(base));
+}
+
+/// Fitted in full, those that are worth it. Where a mismatch is too large for two laws to explain alike the simplest comes first, and none behind one that leaves nothing.
 std::vector<Trial> LawSearch::followed(std::vector<Trial> tried, const Trial& base) const {
-  const bool driven = all_driven(base.arrival.joint), by_decays = shows_in_decays(base);
-  in_parallel(tried.size(), [&](std::size_t i) {
-    hold_undetermined(tried[i]);
-    if (driven) follow_nonlinear(problem_, tried[i], base, INFINITY);
-    else if (nonlinear(tried[i])) tried[i].ruled_out = !fit_decays_first(tried[i], base, by_decays);
-  });
-  // Of thousands of samples twice the excess of another is beyond any evidence.
+  const bool driven = all_driven(base.arrival.joint), by_decays = shows_in_decays(base), one_will_do = base.reduced_chi2() > nearly_explained;
+  if (one_will_do)
+    sort_by(tried, [&](const Trial& t) {
+      constexpr double far_dearer = 100;  // what follows its runs in small steps, than a further parameter
+      const auto parameters = static_cast<double>(effect(problem_.rig, t.effects.back()).parameters_on(problem_.rig).size());
+      return parameters + (decays_decide(t) ? far_dearer : 0) - std::clamp(t.score, 0.0, 1.0);
+    });
   const auto excess = [](const Trial& t) { return std::max(0.0, left_of_decays(t) - 1); };
+  const auto follows_decays = [&](const Trial& t) { return !t.ruled_out && (!by_decays || excess(t) < explained - 1); };
+  std::vector<Trial> all;
   double least = INFINITY;
-  for (const Trial& t : tried)
-    if (by_decays && !t.ruled_out) least = std::min(least, std::max(excess(t), explained - 1));
-  std::erase_if(tried, [&](const Trial& t) { return t.ruled_out || (by_decays && excess(t) > 2 * least); });
-  in_parallel(tried.size(), [&](std::size_t i) {
-    if (!driven) follow_further(tried[i], INFINITY);
-  });
-  sort_by(tried, [&](const Trial& t) { return bic_difference(t, base_); });
-  return tried;
+  for (std::size_t first = 0, end = 0; first < tried.size(); first = end) {
+    if (one_will_do) {
+      bool follows = false;
+      for (; end < tried.size() && !follows; ++end) {
+        follow_decays(tried[end], base);
+        follows = follows_decays(tried[end]);
+      }
+    } else {
+      end = tried.size();
+      in_parallel(end, [&](std::size_t i) { follow_decays(tried[i], base); });
+    }
+    // Of thousands of samples twice the excess of another is beyond any evidence.
+    for (std::size_t i = first; i < end; ++i)
+      if (by_decays && !tried[i].ruled_out) least = std::min(least, std::max(excess(tried[i]), explained - 1));
+    const std::size_t before = all.size();
+    for (std::size_t i = first; i < end; ++i)
+      if (!tried[i].ruled_out && !(by_decays && excess(tried[i]) > 2 * least)) all.push_back(std::move(tried[i]));
+    in_parallel(all.size() - before, [&](std::size_t i) {
+      if (!driven) follow_further(all[before + i], INFINITY);
+    });
+    if (one_will_do && std::any_of(all.begin(), all.end(), leaves_nothing)) break;
+  }
+  sort_by(all, [&](const Trial& t) { return bic_difference(t, base_); });
+  return all;
+}
+
+/// To first order: then they are tried before any form.
+bool LawSearch::signals_leave_nothing(const Promised& promised) const {
+  double noise = 0, all = 0;  // what noise makes of chi-square where runs that are not explained are weighted down
+  for (std::size_t r = 0; r < base_.variance.size(); ++r) {
+    const auto samples = static_cast<double>(base_.arrival.joint.runs()[r].run().samples());
+    noise += samples / std::max(1.0, base_.variance[r]);
+    all += samples;
+  }
+  return promised.by_a_signal > promised.by_a_law && 1 - promised.by_a_signal < explained * noise / all;
 }
 
 /// Whether the best of these, the first, asks for another law beside it.
@@ -162,17 +214,11 @@ bool LawSearch::goes_on(const std::vector<Trial>& tried) const {
   return !tried.empty() && tried.front().effects.size() < most_effects && leaves_something_(tried.front()) && bic_difference(tried.front(), base_) < 0 && !is_noise_(tried.front());
 }
 
-/// Whether forms may explain what laws of the list do not, or as well. Of one that leaves nothing of a mismatch too large for two laws to explain alike only a form that promises more is a rival.
-bool LawSearch::may_have_rivals(const std::vector<Trial>& tried) const {
-  return base_.reduced_chi2() < nearly_explained || std::all_of(tried.begin(), tried.end(), leaves_something_);
-}
-
 /// A search among many ends before the least chi-square of any: where it is near, the first is taken there before it is asked what it leaves. Of runs that are driven, from first guesses with what is known of the law by now.
 void LawSearch::settle_first(std::vector<Trial>& tried) const {
-  if (tried.empty() || leaves_nothing(tried.front()) || tried.front().reduced_chi2() > nearly_explained || decays_decide(tried.front()) || bic_difference(tried.front(), base_) >= 0) return;
+  if (tried.empty() || tried.front().is_settled || leaves_nothing(tried.front()) || tried.front().reduced_chi2() > nearly_explained || decays_decide(tried.front()) || bic_difference(tried.front(), base_) >= 0) return;
   if (all_driven(tried.front().arrival.joint)) fit_from_first_guesses(problem_, tried.front());
-  tried.front().arrival.joint.solve({});
-  measure(tried.front());
+  settle(tried.front());
   tried.front() = in_finer_steps(std::move(tried.front()));
 }
 
@@ -187,42 +233,44 @@ std::vector<Trial> LawSearch::search() {
     sort_by(all, [&](const Trial& t) { return bic_difference(t, base_); });
     settle_first(all);
   };
-  const auto with_forms = [&](const Trial& base, std::vector<std::string> ids) {
-    const std::vector<std::string> forms = forms_worth_a_fit(base);
-    ids.insert(ids.end(), forms.begin(), forms.end());
+  const auto listed = [&](const Trial& base) {
+    std::vector<std::string> ids = of_the_list(base);
+    if (among_ == Among::forms) std::erase_if(ids, [forms = listed_forms()](const std::string& id) { return !is_among(forms, id); });
     return ids;
   };
-  const auto listed = [&](const Trial& base) { return among_ == Among::laws_and_forms ? of_the_list(base) : std::vector<std::string>(); };
   tell(base_);
   Promised promised, beside_first;
   std::vector<std::string> first_of_the_list;  // beside which laws of the list were looked for
   if (among_ == Among::laws_and_forms) {
-    Prospects laws = prospects(base_, listed(base_), {});
+    screened_ = screened_beside(base_, listed(base_));
+    Prospects laws = prospects(base_, screened_, {});
     promised = laws.promised;
     follow(std::move(laws), base_);
     if (goes_on(all) && all.front().excess() < half_of_it * base_.excess()) {
       const Trial first = all.front();
-      Prospects second = prospects(first, listed(first), {});
+      Prospects second = prospects(first, screened_beside(first, listed(first)), {});
       beside_first = second.promised;
       first_of_the_list = first.effects;
       follow(std::move(second), first);
     }
   }
-  follow(prospects(base_, with_forms(base_, {}), promised, may_have_rivals(all) ? half_of_it : 1), base_);
+  if (signals_leave_nothing(promised)) return all;
+  follow(rivals(promised, all), base_);
   if (goes_on(all)) {
     const Trial first = all.front();
     tell(first);
     const bool asked = first.effects == first_of_the_list;
-    follow(prospects(first, with_forms(first, asked ? std::vector<std::string>() : listed(first)), asked ? beside_first : Promised()), first);
+    std::vector<std::string> ids = asked ? std::vector<std::string>() : listed(first);
+    const std::vector<std::string> forms = forms_worth_a_fit(first);
+    ids.insert(ids.end(), forms.begin(), forms.end());
+    follow(prospects(first, screened_beside(first, ids), asked ? beside_first : Promised()), first);
   }
   if (!all.empty() && all.front().effects.size() > 1) {
     problem_.rig.laws = all.front().arrival.joint.model().rig().laws;
     for (Trial& fewer : taken_away(problem_, all.front())) all.push_back(std::move(fewer));
   }
   in_parallel(all.size(), [&](std::size_t i) {  // rivals are told apart by less than where a search among many ends
-    if ((!leaves_nothing(all[i]) && i > 0) || decays_decide(all[i])) return;
-    all[i].arrival.joint.solve({});
-    measure(all[i]);
+    if ((leaves_nothing(all[i]) || i == 0) && !decays_decide(all[i]) && !all[i].is_settled) settle(all[i]);
   });
   sort_by(all, [&](const Trial& t) { return bic_difference(t, base_); });
   return all;

@@ -17,7 +17,7 @@ namespace unrig {
 /// 4. Where the best leaves something, a second law is looked for beside it, and what that makes superfluous is taken away.
 ///
 /// Before anything else was tried (Among::laws_and_forms) laws are looked for where one of them promises most of all effects, signals included, to first order, and only what promises half as much: laws of the list, one and a second
-/// beside it, and forms, which are their rivals.
+/// beside it, and forms, which are their rivals; no forms where a signal promises to leave nothing.
 ///
 /// Source: M. Alvarez, D. Luengo and N. Lawrence, Latent force models, AISTATS (2009); S. L. Brunton, J. L. Proctor and J. N. Kutz, PNAS 113 (2016) 3932, whose candidates are regressed on derivatives, here on readings.
 class LawSearch {
@@ -31,6 +31,8 @@ class LawSearch {
 
   /// All sets that were fitted in full, `base` with one law more or two, the best first; empty where no form explains anything.
   std::vector<Trial> search();
+  /// Effects of the list as they were screened beside `base`, each by itself; none where the list was not asked.
+  std::vector<Trial> take_screened() { return std::move(screened_); }
 
  private:
   /// Largest share of chi-square that was promised to first order.
@@ -42,10 +44,13 @@ class LawSearch {
     std::vector<Trial> laws;
     Promised promised;
   };
-  Prospects prospects(const Trial& base, const std::vector<std::string>& ids, const Promised& known, double least = half_of_it) const;
-  bool may_have_rivals(const std::vector<Trial>& tried) const;
+  std::vector<Trial> screened_beside(const Trial& base, const std::vector<std::string>& ids) const;
+  Prospects prospects(const Trial& base, std::vector<Trial> screened, const Promised& known, double least = half_of_it) const;
+  Prospects rivals(const Promised& promised, const std::vector<Trial>& tried);
+  bool signals_leave_nothing(const Promised& promised) const;
   std::vector<std::string> forms_worth_a_fit(const Trial& base);
   std::vector<std::string> of_the_list(const Trial& base) const;
+  void follow_decays(Trial& trial, const Trial& base) const;
   void settle_first(std::vector<Trial>& tried) const;
   std::vector<Trial> followed(std::vector<Trial> tried, const Trial& base) const;
   bool goes_on(const std::vector<Trial>& tried) const;
@@ -54,6 +59,7 @@ class LawSearch {
   const Trial& base_;
   Asked leaves_something_, is_noise_;
   Among among_;
+  std::vector<Trial> screened_;
 };
 
 }  // namespace unrig

@@ -256,6 +256,13 @@ Trial prepare(const FitProblem& problem, const Trial& base, const std::vector<st
 void fit_fully(Trial& trial, int rounds) {
   anneal(trial.arrival, rounds);
   measure(trial);
+  trial.is_settled = false;
+}
+
+void settle(Trial& trial) {
+  trial.arrival.joint.solve({});
+  measure(trial);
+  trial.is_settled = true;
 }
 
 std::vector<Trial> taken_away(const FitProblem& problem, const Trial& trial) {

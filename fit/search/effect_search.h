@@ -21,6 +21,7 @@ struct Trial {
   int variables = 0;
   DecaysLeft decays = {INFINITY, true};  ///< what fit_decays left of them; infinite: not asked
   bool ruled_out = false;         ///< by the free decays: the other runs were not searched
+  bool is_settled = false;        ///< at its least chi-square, further than a search among many goes (settle)
 
   double reduced_chi2() const;    ///< over all runs, in units of the noise
   /// Residual power above the noise, over the noise; a run that is left with less than its noise makes up for no other.
@@ -101,6 +102,9 @@ Arrival arrive_at_effects(const FitProblem& problem);
 
 /// Fits a prepared trial with everything free, while the weights of the runs return to those of their noise, in so many rounds.
 void fit_fully(Trial& trial, int rounds);
+
+/// Goes on to the least chi-square.
+void settle(Trial& trial);
 
 /// One set after the other with an effect fewer, of which the evidence is not decisively less: what the others made superfluous is taken away, the last effect too, by way of which they may have come to a minimum that they had
 /// missed. None where nothing is superfluous.
