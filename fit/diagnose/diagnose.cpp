@@ -223,7 +223,7 @@ bool effects_beat_noise(const DiagnoseProblem& problem, const FitProblem& fit_pr
   const DiagnoseProblem steady = without_wandering(problem);
   if (steady.effects.empty()) return false;
   Selection selection(steady, fit_problem, white);
-  selection.hold_laws_against(1 - coloured.reduced_chi2() / white.reduced_chi2());
+  selection.hold_against(coloured);
   const Trial best = selection.best_set();
   return !best.effects.empty() && !what_remains(best).found && bic_in_its_noise(best) - bic_in_its_noise(coloured) < -decisive;
 }
@@ -330,7 +330,7 @@ Diagnosis diagnose_in_order(const DiagnoseProblem& problem, bool numbers_known) 
   // What a set leaves may be noise that is not white, in which all is to be held against each other anew, or the rig's description.
   const Setting files{&fit_problem, &problem.heldout};
   auto selection = std::make_unique<Selection>(problem, fit_problem, baseline);
-  if (described_already) selection->hold_laws_against(1 - description->trial.reduced_chi2() / baseline.reduced_chi2());
+  if (described_already) selection->hold_against(description->trial);
   bool anew = false, asked = numbers_known;
   std::optional<FoundSet> beside;  // the rig's description and laws
   const auto noise_or_rig = [&](const Trial& set) {

@@ -141,6 +141,17 @@ Selection::Selection(const DiagnoseProblem& problem, const FitProblem& fit_probl
   ranking_.push_back({{}, baseline.reduced_chi2(), 0, 0, 0});
 }
 
+/// In chi-square with the weights that the baseline gives its runs, as promises are told.
+void Selection::hold_against(const Trial& other) {
+  double left = 0, all = 0;
+  for (std::size_t r = 0; r < baseline_.variance.size(); ++r) {
+    const double weight = static_cast<double>(baseline_.arrival.joint.runs()[r].run().samples()) / std::max(1.0, baseline_.variance[r]);
+    left += weight * other.variance[r];
+    all += weight * baseline_.variance[r];
+  }
+  taken_ = 1 - left / all;
+}
+
 /// Effects that can act in at least one of the runs of this rig, are not at work yet, and not `hopeless`.
 Strings Selection::candidates(const Strings& at_work, const Strings& hopeless) const {
   const JointProblem& joint = baseline_.arrival.joint;
@@ -188,7 +199,8 @@ Trials Selection::try_one_more(const Trial& base, const Strings& hopeless) {
     const bool steps_say_little = far && best_score < half_of_it;  // of laws far from the truth
     const bool promises = linear.size() + others.size() < most_refits && (trial->score > 0.25 * best_score || (follows_law && steps_say_little));
     const bool step_says_nothing = steps_say_little && brings_a_law(*trial);
-    if (brings_a_law(*trial) && ((!far && !may_be_seen(*trial, base)) || (is_first(base) && trial->score < half_of_it * taken_))) continue;
+    if (brings_a_law(*trial) && !far && !may_be_seen(*trial, base)) continue;
+    if (is_first(base) && !promises_nothing && trial->score < half_of_it * taken_) continue;
     if (prepared.size() <= few || promises_nothing || promises || step_says_nothing) (follows_law ? others : linear).push_back(std::move(*trial));
     else if (!follows_law) unpromising.push_back(std::move(*trial));
   }
@@ -265,7 +277,7 @@ Trials Selection::rivals(const Trial& best, const std::string& member) {
     if (is_fitted(set)) return;
     Trial trial = screened(fit_problem_, screening, others, set);
     if (brings_a_law(trial) && others.reduced_chi2() > nearly_explained) return;  // too large a mismatch for two laws to explain alike
-    if (brings_a_law(trial) && fewer.empty() && trial.score < half_of_it * taken_) return;
+    if (fewer.empty() && trial.score < half_of_it * taken_) return;
     if (without - (1 - trial.score) * now > half_of_it * (without - with_it)) prepared[i] = std::move(trial);
   });
   Trials rivals;

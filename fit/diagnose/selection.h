@@ -32,8 +32,8 @@ class Selection {
   /// `baseline` itself where no mismatch is found or no effect is worth it. It ends, too, with a set that leaves something where `enough` says so. `begun`: a set that was found elsewhere, from which it goes on.
   Trial best_set(const std::function<bool(const Trial&)>& enough = {}, const Trial* begun = nullptr);
 
-  /// Something else takes this share of chi-square: a law that promises less than half of that does not come out ahead, and is not fitted.
-  void hold_laws_against(double share) { taken_ = share; }
+  /// `other` explains everything without an effect: one that promises less than half of what it takes does not come out ahead, and is not fitted.
+  void hold_against(const Trial& other);
 
   /// Effects as they were screened beside the baseline elsewhere, each by itself.
   void know(std::vector<Trial> screened) { screened_ = std::move(screened); }

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <iterator>
+#include <numeric>
 #include <optional>
 #include <string>
 #include <utility>
@@ -19,6 +20,7 @@ namespace unrig {
 namespace {
 
 constexpr std::size_t most_in_full = 5;
+constexpr double other_shapes = 0.25;  // of what is promised without forms: one that promises less at its first shape is not asked at others (tests/studies/LAWS.md)
 
 /// Ascending in a number that is asked for once of each; what is none comes last.
 template <class T, class Key>
@@ -61,31 +63,43 @@ Eigen::VectorXd start_of(Form form, const BesideUnknownForces& beside) {
 LawSearch::LawSearch(FitProblem& problem, const Trial& base, Asked leaves_something, Asked is_noise, Among among)
     : problem_(problem), base_(base), leaves_something_(std::move(leaves_something)), is_noise_(std::move(is_noise)), among_(among) {}
 
-/// Ids of the forms that promise most to first order, which the rig gets.
-std::vector<std::string> LawSearch::forms_worth_a_fit(const Trial& base) {
+/// What `which` of the forms promise to first order at the best of their starts, where they stand then; -inf for those at work and for all others. The rig gets these.
+std::vector<double> LawSearch::screen_forms(const Trial& base, const Screening& screening, std::vector<Form>& forms, const std::vector<std::size_t>& which) {
+  std::erase_if(problem_.rig.laws, [&](const auto& law) { return !is_among(base.effects, law->id); });
+  for (const std::size_t i : which)
+    if (!is_among(base.effects, forms[i].law.id())) problem_.rig.laws.push_back(as_effect(forms[i]));
+  std::vector<double> promise(forms.size(), -INFINITY);
+  in_parallel(which.size(), [&](std::size_t k) {
+    Form& form = forms[which[k]];
+    const std::string id = form.law.id();
+    if (is_among(base.effects, id)) return;
+    std::vector<std::string> set = base.effects;
+    set.push_back(id);
+    const Trial trial = screened(problem_, screening, base, set);
+    promise[which[k]] = trial.score;
+    form.starts = {values_of(trial.arrival.joint, form, id)};
+  });
+  return promise;
+}
+
+/// Ids of the forms that promise most to first order, which the rig gets. `known`: what is promised without them.
+std::vector<std::string> LawSearch::forms_worth_a_fit(const Trial& base, const Promised& known) {
   const BesideUnknownForces beside = beside_unknown_forces(base.arrival.joint);
   std::vector<Form> forms = dictionary(problem_.rig, reach_of(beside));
   std::erase_if(forms, [](const Form& form) { return !form.listed.empty(); });
   std::vector<std::shared_ptr<const Effect>> at_work = base.arrival.joint.model().rig().laws;  // the rig may have got others since
   std::erase_if(at_work, [&](const auto& law) { return !is_among(base.effects, law->id); });
   problem_.rig.laws = at_work;
-  std::vector<std::string> ids;
-  for (Form& form : forms) {
-    form.starts = shapes_of(form, Grid::coarse);
-    const std::shared_ptr<const Effect> law = as_effect(form);
-    ids.push_back(law->id);
-    if (!is_among(base.effects, law->id)) problem_.rig.laws.push_back(law);
-  }
   const Screening screening(problem_, base.arrival);
-  std::vector<double> promise(forms.size(), -INFINITY);
-  in_parallel(forms.size(), [&](std::size_t i) {
-    if (is_among(base.effects, ids[i])) return;
-    std::vector<std::string> set = base.effects;
-    set.push_back(ids[i]);
-    const Trial trial = screened(problem_, screening, base, set);
-    promise[i] = trial.score;
-    forms[i].starts = {values_of(trial.arrival.joint, forms[i], ids[i])};
-  });
+  std::vector<std::size_t> all(forms.size());
+  std::iota(all.begin(), all.end(), std::size_t{0});
+  std::vector<Form> at_first = forms;
+  for (Form& form : at_first) form.starts.resize(1);
+  const std::vector<double> at_first_shape = screen_forms(base, screening, at_first, all);
+  // At its best shape a form promises up to some times of that.
+  std::erase_if(all, [&](std::size_t i) { return !(at_first_shape[i] > other_shapes * std::max(known.by_a_law, known.by_a_signal)); });
+  for (const std::size_t i : all) forms[i].starts = shapes_of(forms[i], Grid::coarse);
+  const std::vector<double> promise = screen_forms(base, screening, forms, all);
   std::vector<std::size_t> order;
   for (std::size_t i = 0; i < forms.size(); ++i)
     if (promise[i] > 0) order.push_back(i);
@@ -99,7 +113,7 @@ std::vector<std::string> LawSearch::forms_worth_a_fit(const Trial& base) {
     Form form = forms[i];
     if (shows_in_decays(base)) form.starts = {start_of(form, beside)};
     problem_.rig.laws.push_back(as_effect(form));
-    worth_it.push_back(ids[i]);
+    worth_it.push_back(form.law.id());
   }
   return worth_it;
 }
@@ -146,7 +160,7 @@ LawSearch::Prospects LawSearch::prospects(const Trial& base, std::vector<Trial> 
 /// Forms that may explain what laws of the list do not, or as well. Of one that leaves nothing of a mismatch too large for two laws to explain alike only what promises more with no more parameters is a rival.
 LawSearch::Prospects LawSearch::rivals(const Promised& promised, const std::vector<Trial>& tried) {
   const bool none = base_.reduced_chi2() > nearly_explained && std::any_of(tried.begin(), tried.end(), [&](const Trial& t) { return !leaves_something_(t); });
-  Prospects forms = prospects(base_, screened_beside(base_, forms_worth_a_fit(base_)), promised, none ? 1 : half_of_it);
+  Prospects forms = prospects(base_, screened_beside(base_, forms_worth_a_fit(base_, promised)), promised, none ? 1 : half_of_it);
   const auto parameters = [&](const Trial& t) { return effect(problem_.rig, t.effects.back()).parameters_on(problem_.rig).size(); };
   if (none) std::erase_if(forms.laws, [&](const Trial& t) { return parameters(t) > parameters(tried.front()); });
   return forms;
@@ -216,10 +230,11 @@ bool LawSearch::goes_on(const std::vector<Trial>& tried) const {
 
 /// A search among many ends before the least chi-square of any: where it is near, the first is taken there before it is asked what it leaves. Of runs that are driven, from first guesses with what is known of the law by now.
 void LawSearch::settle_first(std::vector<Trial>& tried) const {
-  if (tried.empty() || tried.front().is_settled || leaves_nothing(tried.front()) || tried.front().reduced_chi2() > nearly_explained || decays_decide(tried.front()) || bic_difference(tried.front(), base_) >= 0) return;
+  if (tried.empty() || tried.front().is_settled || !leaves_something_(tried.front()) || tried.front().reduced_chi2() > nearly_explained || decays_decide(tried.front()) || bic_difference(tried.front(), base_) >= 0) return;
   if (all_driven(tried.front().arrival.joint)) fit_from_first_guesses(problem_, tried.front());
   settle(tried.front());
   tried.front() = in_finer_steps(std::move(tried.front()));
+  tried.front().is_settled = true;
 }
 
 std::vector<Trial> LawSearch::search() {
@@ -261,7 +276,7 @@ std::vector<Trial> LawSearch::search() {
     tell(first);
     const bool asked = first.effects == first_of_the_list;
     std::vector<std::string> ids = asked ? std::vector<std::string>() : listed(first);
-    const std::vector<std::string> forms = forms_worth_a_fit(first);
+    const std::vector<std::string> forms = forms_worth_a_fit(first, asked ? beside_first : Promised());
     ids.insert(ids.end(), forms.begin(), forms.end());
     follow(prospects(first, screened_beside(first, ids), asked ? beside_first : Promised()), first);
   }

@@ -48,7 +48,8 @@ class LawSearch {
   Prospects prospects(const Trial& base, std::vector<Trial> screened, const Promised& known, double least = half_of_it) const;
   Prospects rivals(const Promised& promised, const std::vector<Trial>& tried);
   bool signals_leave_nothing(const Promised& promised) const;
-  std::vector<std::string> forms_worth_a_fit(const Trial& base);
+  std::vector<double> screen_forms(const Trial& base, const Screening& screening, std::vector<Form>& forms, const std::vector<std::size_t>& which);
+  std::vector<std::string> forms_worth_a_fit(const Trial& base, const Promised& known);
   std::vector<std::string> of_the_list(const Trial& base) const;
   void follow_decays(Trial& trial, const Trial& base) const;
   void settle_first(std::vector<Trial>& tried) const;
