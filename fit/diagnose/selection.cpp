@@ -23,6 +23,7 @@ using Trials = std::vector<Trial>;  // the best first once they are fitted
 using Tell = std::function<void(const std::string&)>;
 
 constexpr double twice_the_noise = 2;
+constexpr double quarter_of_it = 0.25;  // of what the best promises to first order: less is not worth a fit
 constexpr double hardly_less = 0.9;  // of the excess: an effect that leaves so much of it is not what is missing
 constexpr std::size_t most_refits = 5, most_in_full = 2;
 constexpr std::size_t few = 7;  // candidates that are all worth a fit
@@ -167,6 +168,9 @@ Strings Selection::candidates(const Strings& at_work, const Strings& hopeless) c
   return ids;
 }
 
+/// Beside what else explains everything. Signals move the rig's parameters, and may take some times what they promise.
+bool Selection::takes_too_little(const Trial& screened) const { return screened.score < (brings_a_law(screened) ? half_of_it : quarter_of_it) * taken_; }
+
 /// Each of `ids` beside `base`.
 std::vector<std::unique_ptr<Trial>> Selection::screened_beside(const Trial& base, const Strings& ids) {
   std::vector<std::unique_ptr<Trial>> prepared(ids.size());
@@ -196,11 +200,10 @@ Trials Selection::try_one_more(const Trial& base, const Strings& hopeless) {
   for (const auto& trial : prepared) {
     const bool promises_nothing = effect(trial->effects.back()).parameters_on(problem_.rig).empty();  // it may hold all the same
     const bool follows_law = nonlinear(*trial), far = base.reduced_chi2() > twice_the_noise;
-    const bool steps_say_little = far && best_score < half_of_it;  // of laws far from the truth
-    const bool promises = linear.size() + others.size() < most_refits && (trial->score > 0.25 * best_score || (follows_law && steps_say_little));
-    const bool step_says_nothing = steps_say_little && brings_a_law(*trial);
+    const bool promises = linear.size() + others.size() < most_refits && trial->score > quarter_of_it * best_score;
+    const bool step_says_nothing = far && best_score < half_of_it && takes_small_steps(trial->arrival.joint);  // of corners that bend a trajectory
     if (brings_a_law(*trial) && !far && !may_be_seen(*trial, base)) continue;
-    if (is_first(base) && !promises_nothing && trial->score < half_of_it * taken_) continue;
+    if (is_first(base) && !promises_nothing && takes_too_little(*trial)) continue;
     if (prepared.size() <= few || promises_nothing || promises || step_says_nothing) (follows_law ? others : linear).push_back(std::move(*trial));
     else if (!follows_law) unpromising.push_back(std::move(*trial));
   }
@@ -277,7 +280,7 @@ Trials Selection::rivals(const Trial& best, const std::string& member) {
     if (is_fitted(set)) return;
     Trial trial = screened(fit_problem_, screening, others, set);
     if (brings_a_law(trial) && others.reduced_chi2() > nearly_explained) return;  // too large a mismatch for two laws to explain alike
-    if (fewer.empty() && trial.score < half_of_it * taken_) return;
+    if (fewer.empty() && takes_too_little(trial)) return;
     if (without - (1 - trial.score) * now > half_of_it * (without - with_it)) prepared[i] = std::move(trial);
   });
   Trials rivals;
@@ -297,10 +300,11 @@ Trials Selection::rivals(const Trial& best, const std::string& member) {
   return rivals;
 }
 
-/// Each member is challenged by its rivals: far from the truth a step promises little of what there is, and a search ends with the first that explains the runs.
+/// Each member is challenged by its rivals: far from the truth a step promises little of what there is, and a search ends with the first that explains the runs. Beside others a line at a known frequency is not.
 Trial Selection::challenged(Trial best) {
   const Strings members = best.effects;
   for (const std::string& member : members) {
+    if (members.size() > lines_.size() && std::find(lines_.begin(), lines_.end(), member) != lines_.end()) continue;
     tell("trying what may explain the runs in place of " + member);
     Trials tried = rivals(best, member);
     if (tried.empty()) continue;
@@ -353,9 +357,11 @@ void Selection::take_known_lines(Trial& best) {
   if (!lines_.empty() && !what_remains(best).found) best = challenged(std::move(best));
 }
 
-/// Without what is superfluous, and held against what may explain the runs in place of its members.
+/// Held against what may explain the runs in place of its members; then without what that made superfluous.
 Trial Selection::settled(Trial trial) {
-  trial = without_superfluous(challenged(std::move(trial)));
+  const Strings before = trial.effects;
+  trial = challenged(std::move(trial));
+  if (!same_set(before, trial.effects)) trial = without_superfluous(std::move(trial));
   judge_decays(trial);
   return trial;
 }

@@ -32,7 +32,7 @@ class Selection {
   /// `baseline` itself where no mismatch is found or no effect is worth it. It ends, too, with a set that leaves something where `enough` says so. `begun`: a set that was found elsewhere, from which it goes on.
   Trial best_set(const std::function<bool(const Trial&)>& enough = {}, const Trial* begun = nullptr);
 
-  /// `other` explains everything without an effect: one that promises less than half of what it takes does not come out ahead, and is not fitted.
+  /// `other` explains everything without an effect: a law that promises less than half of what it takes, or a signal that promises less than a quarter, does not come out ahead, and is not fitted.
   void hold_against(const Trial& other);
 
   /// Effects as they were screened beside the baseline elsewhere, each by itself.
@@ -62,6 +62,7 @@ class Selection {
   std::vector<Trial> rivals(const Trial& best, const std::string& member);
   Trial challenged(Trial best);
   bool is_fitted(const std::vector<std::string>& set) const;
+  bool takes_too_little(const Trial& screened) const;
   void tell(const std::string& what) const {
     if (problem_.progress) problem_.progress(what);
   }

@@ -11,7 +11,8 @@ namespace unrig {
 
 /// The law of a force that no effect on the list explains.
 ///
-/// 1. Every form of the dictionary at several shapes, its force sent through the rig onto the readings beside all unknowns of the fit (Screening): the share of chi-square that it promises to first order.
+/// 1. Every form of the dictionary, its force sent through the rig onto the readings beside all unknowns of the fit (Screening): the share of chi-square that it promises to first order. At several shapes where the first
+///    promises something.
 /// 2. The coefficients of those that promise most, and where they are seen decisively the shapes, from states that the free decays ask for beside unknown accelerations (beside_unknown_forces, screen).
 /// 3. These are fitted with all their parameters free: to the free decays first, then to all runs; runs that are driven from first guesses. All are held against each other by BIC.
 /// 4. Where the best leaves something, a second law is looked for beside it, and what that makes superfluous is taken away.

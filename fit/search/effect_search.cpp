@@ -265,13 +265,33 @@ void settle(Trial& trial) {
   trial.is_settled = true;
 }
 
+namespace {
+
+/// Whether a step from where the fit stands without an effect leaves far more than what it saves in parameters: of signals, which such a step follows.
+bool is_missed(Trial& fewer, const Trial& with, const std::string& id) {
+  const JointProblem& joint = with.arrival.joint;
+  if (is_a_law(id, AeroelasticModel(joint.model().rig(), joint.model().basis(), joint.model().circulation()), joint)) return false;
+  measure(fewer);
+  double samples = 0;
+  for (const double n : with.samples) samples += n;
+  const double lost = -fewer.score * joint.chi2(), saved = (with.variables - fewer.variables) * std::log(samples);
+  return half_of_it * lost > saved + decisive;
+}
+
+}  // namespace
+
 std::vector<Trial> taken_away(const FitProblem& problem, const Trial& trial) {
   std::vector<Trial> smaller;
   const auto now = [&]() -> const Trial& { return smaller.empty() ? trial : smaller.back(); };
   for (std::size_t k = 0; now().effects.size() > 1 && k < now().effects.size();) {
     std::vector<std::string> effects = now().effects;
+    const std::string id = effects[k];
     effects.erase(effects.begin() + static_cast<std::ptrdiff_t>(k));
     Trial fewer = prepare(problem, now(), effects);
+    if (is_missed(fewer, now(), id)) {
+      ++k;
+      continue;
+    }
     fit_fully(fewer, 6);
     if (bic_difference(fewer, now()) < decisive) smaller.push_back(std::move(fewer));
     else ++k;
