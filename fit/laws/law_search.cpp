@@ -173,9 +173,10 @@ void LawSearch::follow_decays(Trial& trial, const Trial& base) const {
   else if (nonlinear(trial)) trial.ruled_out = !fit_decays_first(trial, base, shows_in_decays(base));
 }
 
-/// Fitted in full, those that are worth it. Where a mismatch is too large for two laws to explain alike the simplest comes first, and none behind one that leaves nothing.
+/// Fitted in full, those that are worth it. Of the list, where a mismatch is too large for two laws to explain alike, the simplest comes first, and none behind one that leaves nothing. Forms are all fitted: some are rivals.
 std::vector<Trial> LawSearch::followed(std::vector<Trial> tried, const Trial& base) const {
-  const bool driven = all_driven(base.arrival.joint), by_decays = shows_in_decays(base), one_will_do = base.reduced_chi2() > nearly_explained;
+  const bool driven = all_driven(base.arrival.joint), by_decays = shows_in_decays(base);
+  const bool one_will_do = base.reduced_chi2() > nearly_explained && std::none_of(tried.begin(), tried.end(), [](const Trial& t) { return is_law_id(t.effects.back()); });
   if (one_will_do)
     sort_by(tried, [&](const Trial& t) {
       constexpr double far_dearer = 100;  // what follows its runs in small steps, than a further parameter
