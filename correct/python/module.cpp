@@ -335,8 +335,9 @@ PYBIND11_MODULE(_unrig, m) {
         },
         progress);
   });
-  m.def("diagnose", [](const Rig& rig, const std::vector<Run>& runs, const std::vector<Run>& heldout, const std::vector<std::string>& effects, bool anyway, const py::object& progress) {
+  m.def("diagnose", [](const Rig& rig, const std::vector<Run>& runs, const std::vector<Run>& heldout, const std::vector<std::string>& effects, bool anyway, double work, double limit, const py::object& progress) {
     DiagnoseProblem problem;
+    problem.work = work, problem.limit = limit;
     problem.rig = rig, problem.runs = runs, problem.heldout = heldout;
     problem.effects = effects_of_option("effects", effects);
     return in_a_thread(

@@ -22,8 +22,8 @@ namespace unrig {
 
 constexpr double enough_to_name = 0.97;  ///< share of the excess that effects must remove to be named where something remains
 
-/// What `unrig diagnose` and `unrig trial` allow a search where nothing else is asked [1e9 multiplications].
-constexpr double usual_work = 400;
+/// What `unrig diagnose` and `unrig trial` allow a search where nothing else is asked [1e9 multiplications], and `unrig diagnose` above it [s of the processor].
+constexpr double usual_work = 400, usual_seconds = 60;
 
 /// Why the best set of effects is named or not.
 enum class Naming { named, removes_too_little, only_signals, does_not_predict };

@@ -40,8 +40,6 @@ void check_recordings(const DiagnoseProblem& problem) {
       throw InputError({run.file, 0}, "--heldout holds the same readings as the run " + fitted->file, "wanted another: a run that was fitted cannot test the prediction", "Leave one of them out.");
 }
 
-constexpr double usual_seconds = 60;  // of a search, where nothing else is asked
-
 }  // namespace
 
 int diagnose_command(int argc, char** argv) {

@@ -100,9 +100,10 @@ def correct(rig: Union[Path, Rig], result: Union[Path, FitResult], run: Union[Pa
 
 
 def diagnose(rig: Union[Path, Rig], runs: Iterable[Union[Path, Run]], *, heldout: Iterable[Union[Path, Run]] = (), effects: Sequence[str] = (), anyway: bool = False,
-             progress: Progress = None) -> Diagnosis:
-    """Which known physical effect is missing from the model, as `unrig diagnose`. effects: the candidates; none: all that can act. anyway: as of `fit`."""
-    return Diagnosis(*_unrig.diagnose(as_rig(rig), [as_run(run) for run in runs], [as_run(run) for run in heldout], list(effects), anyway, progress))
+             work: float = 400, limit: float = 60, progress: Progress = None) -> Diagnosis:
+    """Which known physical effect is missing from the model, as `unrig diagnose`. effects: the candidates; none: all that can act. anyway: as of `fit`. work, limit: 1e9 multiplications and seconds of processor
+    time after which the search ends with what it has found."""
+    return Diagnosis(*_unrig.diagnose(as_rig(rig), [as_run(run) for run in runs], [as_run(run) for run in heldout], list(effects), anyway, work, limit, progress))
 
 
 def check(rig: Union[Path, Rig], runs: Iterable[Union[Path, Run]] = ()) -> Checked:

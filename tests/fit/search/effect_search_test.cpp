@@ -6,6 +6,8 @@
 
 #include <cmath>
 #include <memory>
+#include <string>
+#include <vector>
 
 #include "tests/fit/one_mode.h"
 
@@ -83,6 +85,28 @@ TEST(Bic, ColouredSamplesCountAsFewerWhiteOnes) {
     // The mean of 2000 squares of exponential numbers, 2.2 of it each, scatters by 5 %; for r = 0.8 over a fifth of the lines, by 11 %.
     EXPECT_NEAR(fitted.trial.samples.front(), expected, (r < 0.6 ? 0.15 : 0.3) * expected) << r;
   }
+}
+
+/// A hum as large as the noise, and no drift: whichever comes first, only the drift goes, and the hum is not fitted without.
+TEST(TakenAway, IsWhatNothingIsLostWithout) {
+  FitProblem problem;
+  problem.rig = one_mode::rig();
+  problem.runs.push_back(one_mode::decay("decay.csv", 5 * one_mode::free_response(samples, one_mode::hertz).col(0) + 0.05 * one_mode::white_noise(samples, 5) + 0.05 * one_mode::tone(samples, 50.03)));
+  const Trial base = fit_baseline(problem);
+  for (const std::vector<std::string>& both : {std::vector<std::string>{"mains-hum", "gauge-drift"}, {"gauge-drift", "mains-hum"}}) {
+    Trial with = prepare(problem, base, both);
+    fit_fully(with, 6);
+    const std::vector<Trial> fewer = taken_away(problem, with);
+    ASSERT_EQ(fewer.size(), 1u);
+    EXPECT_EQ(fewer.front().effects, std::vector<std::string>{"mains-hum"});
+    EXPECT_NEAR(fewer.front().reduced_chi2(), 1, 0.1) << "of 4000 samples the variance scatters by 2 %, and the noise level is an estimate";
+  }
+  // Without any hum in the readings it goes too, or rather the last of both stays: a set is never empty.
+  problem.runs.front() = one_mode::decay("decay.csv", 5 * one_mode::free_response(samples, one_mode::hertz).col(0) + 0.05 * one_mode::white_noise(samples, 5));
+  const Trial clean = fit_baseline(problem);
+  Trial with = prepare(problem, clean, {"mains-hum", "gauge-drift"});
+  fit_fully(with, 6);
+  EXPECT_EQ(taken_away(problem, with).size(), 1u);
 }
 
 }  // namespace
