@@ -3,8 +3,8 @@
 
 namespace unrig {
 
-/// Multiplications that this thread has made in small_product, triangularise, Householder and along nonlinear laws, with those of the threads that worked for it (in_parallel). For the same input the same number on
-/// every machine, however many threads there are: a search is limited in it where its answer must not depend on the machine.
+/// Multiplications that this thread has made in small_product, triangularise, Householder and along nonlinear laws, with those of the threads that worked for it (in_parallel). For the same input the same number, however fast
+/// the machine is and however many threads there are; of processors with AVX2 and without, whose products are rounded differently, nearly.
 std::uint64_t work_done();
 
 /// Of this thread.

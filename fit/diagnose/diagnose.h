@@ -132,7 +132,7 @@ struct Diagnosis {
 /// with amplitudes of their own in every run), and where runs that were not fitted are predicted better with it than without: those held out or, where there are
 /// none, each fitted run from the others. Otherwise the mismatch is unexplained, and the force is given that would explain it.
 ///
-/// Limits end the search, not the description of what it found. With a limit of work alone the answer is the same on every machine. One diagnosis at a time has a limit of time: processor time is the process's
+/// Limits end the search, not the description of what it found. With a limit of work alone the answer does not depend on the machine's speed. One diagnosis at a time has a limit of time: processor time is the process's
 /// (core/numerics/time_limit.h).
 ///
 /// No digit of it depends on the order of the runs (fit/likelihood/run_order.h).

@@ -55,7 +55,7 @@ int diagnose_command(int argc, char** argv) {
   app.add_flag("--no-law", no_law, "does not look for a law where no effect explains the runs");
   problem.work = usual_work;
   problem.limit = usual_seconds;
-  app.add_option("--work", problem.work, "billions of multiplications after which the search ends with what it has found, on every machine the same; inf: any")->check(wrong_with_limit)->capture_default_str();
+  app.add_option("--work", problem.work, "billions of multiplications after which the search ends with what it has found, whatever the machine's speed; inf: any")->check(wrong_with_limit)->capture_default_str();
   app.add_option("--limit", problem.limit, "the same in seconds of processor time; inf: any")->check(wrong_with_limit)->capture_default_str();
   app.add_option_function<int>("--threads", use_threads, "how many threads to work in; without it, as many as the machine has")->check(CLI::Range(1, 256));
   app.add_option("--fit", fit_output, "writes the winning fit too (fit.json), for simulate and correct");

@@ -1,4 +1,4 @@
-// `diagnose --limit` and `--work`: a search that is ended says so, and tells what it has; where counted work ended it, on every machine the same.
+// `diagnose --limit` and `--work`: a search that is ended says so, and tells what it has; where counted work ended it, the same however many threads there are.
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
