@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <deque>
 #include <functional>
 #include <iterator>
 #include <memory>
@@ -47,21 +48,31 @@ class SearchLimits {
   /// Searches unless a limit is reached; what the search has changed by then stands.
   void spend(const std::function<void()>& search) {
     if (are_reached_) return;
-    constexpr double billion = 1e9, any = 1e9;
     const std::uint64_t before = work_done();
-    const TimeLimit time(until_);
-    const WorkLimit work(static_cast<std::uint64_t>(billion * std::min(any, most_ - done_)));
-    try {
-      search();
-      are_reached_ = TimeLimit::is_lifted();
-    } catch (const OutOfTime&) {
-      are_reached_ = true;
-    }
+    are_reached_ = !is_done_within(until_, most_ - done_, search);
     done_ += static_cast<double>(work_done() - before) / billion;
     are_reached_ = are_reached_ || done_ > most_;
   }
+  /// Whether the description of what was found is done within a quarter of what a search may usually take; of a search without limits always.
+  bool describe(const std::function<void()>& description) const {
+    constexpr double quarter = 0.25;
+    return is_done_within(std::isinf(until_) ? until_ : processor_seconds() + quarter * usual_seconds, std::isinf(most_) ? most_ : quarter * usual_work, description);
+  }
 
  private:
+  static constexpr double billion = 1e9;
+  static bool is_done_within(double until, double most, const std::function<void()>& task) {
+    constexpr double any = 1e9;
+    const TimeLimit time(until);
+    const WorkLimit work(static_cast<std::uint64_t>(billion * std::min(any, most)));
+    try {
+      task();
+      return !TimeLimit::is_lifted();
+    } catch (const OutOfTime&) {
+      return false;
+    }
+  }
+
   double until_, most_, done_ = 0;
   bool are_reached_ = false;
 };
@@ -89,22 +100,32 @@ bool has_colour(const JointProblem& joint) {
   return std::any_of(joint.runs().begin(), joint.runs().end(), [](const RunResidual& run) { return run.colour(0) != nullptr; });
 }
 
+/// With noise and motions looked at again, where that is worth it and does not take too long; otherwise as the search left it.
+FitResult told(const Arrival& found, const FitProblem& problem, Settle settle, const SearchLimits& limits) {
+  FitResult fit;
+  Arrival looked_at_again = found, as_it_is = found;
+  if (settle != Settle::nothing && limits.describe([&] { fit = describe_fit(looked_at_again, problem, settle); })) return fit;
+  fit = describe_fit(as_it_is, problem, Settle::nothing);
+  if (settle != Settle::nothing) fit.warnings.push_back("what was found is told as the search left it: to look at noise and motions again would have taken too long");
+  return fit;
+}
+
 /// Both fits in full, and what they leave of the fitted runs. Of an explanation with the rig's description put right `d.after` is the fit with its laws to the rig as the files have it: no fit is told that
 /// belongs to a rig in no file.
-void describe(const FitProblem& fit_problem, const Trial& baseline, FoundSet& e, Diagnosis& d) {
+void describe(const FitProblem& fit_problem, const Trial& baseline, const SearchLimits& limits, FoundSet& e, Diagnosis& d) {
   const Trial& best = e.best;
   const bool described = e.setting.problem != &fit_problem;
   const auto settled = [](const Trial& trial) { return trial.reduced_chi2() < twice_the_noise ? Settle::noise : Settle::nothing; };
   FitProblem after = *e.setting.problem;
   after.effects = best.effects;
-  Arrival before_arrival = baseline.arrival, after_arrival = best.arrival;
+  Arrival before_arrival = baseline.arrival;
   if (d.mismatch.found) {
     PlainFit plain = plain_fit(fit_problem, baseline.arrival, d.unexplained && !has_colour(baseline.arrival.joint));  // first guesses know of none
     before_arrival = std::move(plain.arrival);
     if (plain.baseline_was_lost) d.not_followed.insert(d.not_followed.begin(), std::vector<std::string>{});
   }
-  d.before = describe_fit(before_arrival, fit_problem, d.mismatch.found ? Settle::nothing : Settle::noise);  // a fit that explains nothing deserves no refinement
-  e.fit = best.effects.empty() && !described ? d.before : describe_fit(after_arrival, after, settled(best));
+  d.before = told(before_arrival, fit_problem, d.mismatch.found ? Settle::nothing : Settle::noise, limits);  // a fit that explains nothing deserves no refinement
+  e.fit = best.effects.empty() && !described ? d.before : told(best.arrival, after, settled(best), limits);
   d.after = e.fit;
   if (described && best.effects.empty()) d.after = d.before;
   if (described && !best.effects.empty()) {
@@ -112,7 +133,7 @@ void describe(const FitProblem& fit_problem, const Trial& baseline, FoundSet& e,
     as_filed.effects = best.effects;
     Trial trial = prepare(as_filed, baseline, best.effects);
     fit_fully(trial, 6);
-    d.after = describe_fit(trial.arrival, as_filed, settled(trial));
+    d.after = told(trial.arrival, as_filed, settled(trial), limits);
   }
   d.bic_after = bic_difference(best, baseline) + e.cost + (d.bic_before = d.before.bic());
   for (std::size_t r = 0; r < fit_problem.runs.size(); ++r) {
@@ -278,6 +299,24 @@ FoundSet laws_beside(const RigDescription& description, const DiagnoseProblem& p
   return with;
 }
 
+/// The rig's description beside laws, looked at once for each set.
+class DescriptionBeside {
+ public:
+  explicit DescriptionBeside(const DiagnoseProblem& problem) : problem_(problem) {}
+  /// Where it explains what a set leaves.
+  const std::optional<RigDescription>& explains(const Trial& set) {
+    const auto known = std::find_if(looked_at_.begin(), looked_at_.end(), [&](const auto& l) { return same_set(l.first, set.effects); });
+    if (known != looked_at_.end()) return known->second;
+    std::optional<RigDescription> there = describe_rig(problem_, set, enough_to_name);
+    if (there && there->left > explained) there.reset();
+    return looked_at_.emplace_back(set.effects, std::move(there)).second;
+  }
+
+ private:
+  const DiagnoseProblem& problem_;
+  std::deque<std::pair<std::vector<std::string>, std::optional<RigDescription>>> looked_at_;
+};
+
 /// The rig's description against the laws that were `found`: with laws `beside` it, as far as these were looked for, where neither explains everything. True where it is the better explanation, then in `found`.
 bool weigh(const DiagnoseProblem& problem, const Setting& files, const Trial& baseline, const RigDescription& description, std::optional<FoundSet> beside, Selection& selection, SearchLimits& limits, FoundSet& found) {
   const double against_baseline = bic_difference(description.trial, baseline) + description.cost;
@@ -325,7 +364,9 @@ Diagnosis diagnose_in_order(const DiagnoseProblem& problem, bool numbers_known) 
   if (coloured) baseline = std::move(in_colour);
   if (coloured) d.mismatch = locate_mismatch(baseline.arrival.joint);
   std::optional<RigDescription> description;
-  if (d.mismatch.found && !numbers_known) limits.spend([&] { description = describe_rig(problem, baseline); });
+  // What is far from explained by a step in the rig's numbers is asked about last.
+  const double far_away = 1 - (nearly_explained - 1) / (baseline.reduced_chi2() - 1);
+  if (d.mismatch.found && !numbers_known) limits.spend([&] { description = describe_rig(problem, baseline, std::max(half_of_it, far_away)); });
   const bool described_already = description && description->left < explained;
   // What a set leaves may be noise that is not white, in which all is to be held against each other anew, or the rig's description.
   const Setting files{&fit_problem, &problem.heldout};
@@ -333,20 +374,23 @@ Diagnosis diagnose_in_order(const DiagnoseProblem& problem, bool numbers_known) 
   if (described_already) selection->hold_against(description->trial);
   bool anew = false, asked = numbers_known;
   std::optional<FoundSet> beside;  // the rig's description and laws
+  std::optional<Trial> begun;      // where the search among all effects goes on from
+  DescriptionBeside described_beside(problem);
   const auto noise_or_rig = [&](const Trial& set) {
     if (Trial there = set; !coloured && explained_by_noise(there)) {
       Trial in_its_noise = baseline;
       take_noise_of(in_its_noise, there);
       baseline = std::move(in_its_noise);
+      begun = std::move(there);
       return coloured = anew = true;
     }
     if (asked || described_already) return false;
-    std::optional<RigDescription> rig = describe_rig(problem, set, enough_to_name);
-    if (!rig || rig->left > explained) return false;
+    std::optional<RigDescription> rig = described_beside.explains(set);
+    if (!rig) return false;
     asked = true;
     FoundSet with = laws_beside(*rig, problem, files, baseline, *selection);
     if (!with.explains()) return false;
-    description = std::move(rig);
+    description = rig;
     with.setting = {description->problem.get(), &description->heldout};
     beside = std::move(with);
     return true;
@@ -355,12 +399,19 @@ Diagnosis diagnose_in_order(const DiagnoseProblem& problem, bool numbers_known) 
   // A law shows in what it promises to first order, in seconds: where one leaves nothing, no set of effects is looked for.
   const bool may_find_laws = problem.laws && problem.effects.empty() && d.mismatch.found;
   std::vector<Trial> laws_tried;
+  bool asked_forms = false;
   std::optional<Laws> laws;
   FoundSet found = look_at(problem, files, baseline, files, baseline, 0);
+  const LawSearch::Asked is_no_law = [&](const Trial& set) {
+    Trial there = set;
+    return explained_by_noise(there) || (!asked && !described_already && set.reduced_chi2() < nearly_explained && described_beside.explains(set));
+  };
   if (may_find_laws && !described_already)
     limits.spend([&] {
       tell("looking for a law in the force that is missing");
-      laws_tried = search_laws(fit_problem, baseline, baseline, LawSearch::Among::laws_and_forms, *selection);
+      LawsTried searched = search_laws(fit_problem, baseline, baseline, LawSearch::Among::laws_and_forms, is_no_law, *selection);
+      laws_tried = std::move(searched.tried);
+      asked_forms = searched.forms;
       if (none_leaves_nothing(laws_tried) && !laws_tried.empty() && !coloured)
         if (Trial in_its_noise = laws_tried.front(); explained_by_noise(in_its_noise)) {  // all is held against each other anew
           take_noise_of(baseline, in_its_noise);
@@ -368,14 +419,13 @@ Diagnosis diagnose_in_order(const DiagnoseProblem& problem, bool numbers_known) 
           d.mismatch = locate_mismatch(baseline.arrival.joint);
           selection = std::make_unique<Selection>(problem, fit_problem, baseline);
           found = look_at(problem, files, baseline, files, baseline, 0);
-          laws_tried = search_laws(fit_problem, baseline, baseline, LawSearch::Among::laws_and_forms, *selection);
+          laws_tried = in_noise_of(in_its_noise, laws_tried, baseline, *selection);
         }
       if (!none_leaves_nothing(laws_tried)) laws = choose_law(problem, fit_problem, files, baseline, laws_tried, *selection, found);
     });
   if (!laws) fit_problem.rig.laws.clear();
   // Laws of the list that take most of the mismatch are where the search among all effects goes on from.
   const auto is_begun = [&](const Trial& t) { return std::none_of(t.effects.begin(), t.effects.end(), is_law_id) && t.excess() < half_of_it * baseline.excess() && bic_difference(t, baseline) < -decisive; };
-  std::optional<Trial> begun;
   if (const auto first = std::find_if(laws_tried.begin(), laws_tried.end(), is_begun); first != laws_tried.end()) begun = *first;
   if (!laws) limits.spend([&] { best_set = selection->best_set(noise_or_rig, begun ? &*begun : nullptr); });
   if (anew) {
@@ -383,10 +433,11 @@ Diagnosis diagnose_in_order(const DiagnoseProblem& problem, bool numbers_known) 
     d.mismatch = locate_mismatch(baseline.arrival.joint);
     selection = std::make_unique<Selection>(problem, fit_problem, baseline);
     best_set = baseline;
-    limits.spend([&] { best_set = selection->best_set(noise_or_rig); });
+    limits.spend([&] { best_set = selection->best_set(noise_or_rig, &*begun); });
   }
   if (!problem.verdict_only) d.maps = residual_maps(baseline.arrival.joint, d.mismatch.runs);
   if (!laws) found = look_at(problem, files, baseline, files, std::move(best_set), 0);
+  if (d.mismatch.found && !numbers_known && !description && !found.explains()) limits.spend([&] { description = describe_rig(problem, baseline); });
   const bool described = description && weigh(problem, files, baseline, *description, std::move(beside), *selection, limits, found);
   if (described && laws) {
     laws.reset();
@@ -399,10 +450,10 @@ Diagnosis diagnose_in_order(const DiagnoseProblem& problem, bool numbers_known) 
     limits.spend([&] {
       tell("looking for the law of what is missing");
       const auto add_beside = [&](const Trial& base) {
-        for (Trial& t : search_laws(fit_problem, baseline, base, LawSearch::Among::forms, *selection)) laws_tried.push_back(std::move(t));
+        for (Trial& t : search_laws(fit_problem, baseline, base, LawSearch::Among::forms, is_no_law, *selection).tried) laws_tried.push_back(std::move(t));
       };
       // Forms were held against laws of the list before, and are looked for beside what takes most of the mismatch below.
-      if (laws_tried.empty() && (one_law || found.best.excess() > half_of_it * baseline.excess())) add_beside(baseline);
+      if (!asked_forms && (one_law || found.best.excess() > half_of_it * baseline.excess())) add_beside(baseline);
       const bool beside_it = begun && same_set(begun->effects, found.best.effects);  // laws were looked for before
       if (!found.best.effects.empty() && !beside_it && !found.explains()) add_beside(found.best);
       laws = choose_law(problem, fit_problem, files, baseline, laws_tried, *selection, found);
@@ -422,7 +473,7 @@ Diagnosis diagnose_in_order(const DiagnoseProblem& problem, bool numbers_known) 
 
   if (!problem.verdict_only) {
     tell("describing the result");
-    describe(fit_problem, baseline, found, d);
+    describe(fit_problem, baseline, limits, found, d);
     for (const ImprovedRun& run : found.unseen) d.runs.push_back(run);
     if (d.unexplained) d.missing_force = missing_forces(best.arrival.joint);
   }

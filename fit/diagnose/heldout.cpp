@@ -42,13 +42,13 @@ HeldoutResidual predict_heldout(const Arrival& arrival, const Run& run) {
   options.precision = 0.1;  // what is predicted moves by less than its own noise
   options.most_evaluations = 15;
   RunResidual& residual = joint.runs().front();
+  if (residual.takes_small_steps(joint.theta(0))) options.enough = 1.02;  // slopes at corners promise more than steps keep; one per cent of it is chance
   residual.follow_in(arrival.joint.runs().front().finer());
   find_motion(residual, joint.theta(0));
   joint.solve(options);
   constexpr double followed = 1.5;
   if (joint.chi2() > followed * static_cast<double>(residual.degrees_of_freedom()) && find_motion(residual, joint.theta(0), true)) joint.solve(options);
-  residual.reject_spikes(joint.theta(0));
-  joint.solve(options);
+  if (residual.reject_spikes(joint.theta(0)) > 0) joint.solve(options);
   const RunResidual::Prediction p = residual.predict(joint.theta(0));
   const VectorXd weight = residual.channel_weight(0), left = run.channel(p.channels.front()).value - p.output.col(0);
   HeldoutResidual result{p.channels.front()};

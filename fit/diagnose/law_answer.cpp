@@ -6,14 +6,13 @@
 
 #include "core/effects/effect.h"
 #include "core/law/law_effect.h"
+#include "core/numerics/in_parallel.h"
 #include "fit/fit_description.h"
 
 namespace unrig {
 namespace {
 
 bool leaves_something(const Trial& t) { return what_remains(t).found; }
-
-bool is_noise(Trial t) { return explained_by_noise(t); }
 
 /// Whether the runs determine no parameter of some member: what they then say is that something acts, not by which equation.
 bool is_undetermined(const FitProblem& problem, const Trial& set) {
@@ -33,12 +32,22 @@ bool is_undetermined(const FitProblem& problem, const Trial& set) {
 
 bool none_leaves_nothing(const std::vector<Trial>& tried) { return std::all_of(tried.begin(), tried.end(), leaves_something); }
 
-std::vector<Trial> search_laws(FitProblem& fit_problem, const Trial& baseline, const Trial& base, LawSearch::Among among, Selection& selection) {
-  LawSearch search(fit_problem, base, leaves_something, is_noise, among);
-  std::vector<Trial> tried = search.search();
+LawsTried search_laws(FitProblem& fit_problem, const Trial& baseline, const Trial& base, LawSearch::Among among, const LawSearch::Asked& is_no_law, Selection& selection) {
+  LawSearch search(fit_problem, base, leaves_something, is_no_law, among);
+  LawsTried found{search.search(), search.asked_forms()};
   if (base.effects.empty()) selection.know(search.take_screened());
-  for (const Trial& t : tried) selection.add({t.effects, t.reduced_chi2(), bic_difference(t, baseline), 0, 0});
-  return tried;
+  for (const Trial& t : found.tried) selection.add({t.effects, t.reduced_chi2(), bic_difference(t, baseline), 0, 0});
+  return found;
+}
+
+std::vector<Trial> in_noise_of(const Trial& first, const std::vector<Trial>& tried, const Trial& baseline, Selection& selection) {
+  std::vector<Trial> anew;
+  for (const Trial& t : tried)
+    if (t.excess() <= 2 * tried.front().excess()) anew.push_back(t);
+  in_parallel(anew.size(), [&](std::size_t i) { take_noise_of(anew[i], first); });
+  std::stable_sort(anew.begin(), anew.end(), [](const Trial& a, const Trial& b) { return bic_difference(a, b) < 0; });
+  for (const Trial& t : anew) selection.add({t.effects, t.reduced_chi2(), bic_difference(t, baseline), 0, 0});
+  return anew;
 }
 
 std::optional<Laws> choose_law(const DiagnoseProblem& problem, FitProblem& fit_problem, const Setting& files, const Trial& baseline, std::vector<Trial> tried, const Selection& selection, FoundSet& found) {

@@ -17,8 +17,16 @@ struct Laws {
 /// Whether none of these leaves nothing that is significant.
 bool none_leaves_nothing(const std::vector<Trial>& tried);
 
-/// Laws beside `base`, which the ranking gets.
-std::vector<Trial> search_laws(FitProblem& fit_problem, const Trial& baseline, const Trial& base, LawSearch::Among among, Selection& selection);
+/// Sets with laws that were fitted in full, the best first.
+struct LawsTried {
+  std::vector<Trial> tried;
+  bool forms = false;  ///< those of the dictionary were asked
+};
+/// Laws beside `base`, which the ranking gets. `is_no_law`: whether what a set leaves is explained without any other law.
+LawsTried search_laws(FitProblem& fit_problem, const Trial& baseline, const Trial& base, LawSearch::Among among, const LawSearch::Asked& is_no_law, Selection& selection);
+
+/// What was tried, in the noise with a colour that `first` of it has by now; the ranking gets that. Without what leaves twice the excess: beyond any evidence.
+std::vector<Trial> in_noise_of(const Trial& first, const std::vector<Trial>& tried, const Trial& baseline, Selection& selection);
 
 /// The law of what no effect explains: beside nothing, since an effect of the list may stand in for it, and beside the best set. A law that is on the list goes by its id: an effect of the list comes first where
 /// no form is decisively better. What leaves nothing comes before the rest: of sets that set decays aside the evidence is that of the other runs. Where the first is named, leaves nothing or is no worse than any

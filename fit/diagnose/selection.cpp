@@ -270,7 +270,7 @@ Trials Selection::rivals(const Trial& best, const std::string& member) {
   Trial others = prepare(fit_problem_, best, fewer);
   measure(others);
   // chi-square: with the member, as it is without, and where a step without it ends; the first step may lead astray.
-  const double with_it = best.arrival.joint.chi2(), now = others.arrival.joint.chi2(), without = std::min(now, (1 - others.score) * with_it);
+  const double with_it = best.arrival.joint.chi2(), without = std::min(others.arrival.joint.chi2(), others.promised_left);
   const Strings ids = candidates(best.effects, {});
   const Screening screening(fit_problem_, others.arrival);
   std::vector<std::optional<Trial>> prepared(ids.size());
@@ -281,7 +281,7 @@ Trials Selection::rivals(const Trial& best, const std::string& member) {
     Trial trial = screened(fit_problem_, screening, others, set);
     if (brings_a_law(trial) && others.reduced_chi2() > nearly_explained) return;  // too large a mismatch for two laws to explain alike
     if (fewer.empty() && takes_too_little(trial)) return;
-    if (without - (1 - trial.score) * now > half_of_it * (without - with_it)) prepared[i] = std::move(trial);
+    if (without - trial.promised_left > half_of_it * (without - with_it)) prepared[i] = std::move(trial);
   });
   Trials rivals;
   for (std::optional<Trial>& trial : prepared)
@@ -398,7 +398,7 @@ Trial Selection::best_set(const std::function<bool(const Trial&)>& enough, const
   Trial best = begun ? *begun : baseline_;
   std::optional<Trial> sufficient;  // a law that is followed all but exactly: what it leaves has a name only where that leaves nothing
   try {
-    if (begun) best = settled(best);
+    if (begun) best = settled(without_superfluous(best));
     if (begun && enough && what_remains(best).found && enough(best)) return best;
     grow(best, enough, sufficient);
   } catch (const OutOfTime&) {

@@ -15,6 +15,7 @@
 #include "core/numerics/in_parallel.h"
 #include "fit/laws/screen.h"
 #include "fit/search/decays_first.h"
+#include "fit/search/left_of_runs.h"
 
 namespace unrig {
 namespace {
@@ -34,6 +35,11 @@ void sort_by(std::vector<T>& all, Key key) {
   std::vector<T> sorted;
   for (const auto& [k, i] : order) sorted.push_back(std::move(all[i]));
   all = std::move(sorted);
+}
+
+/// Whether the model does not stay finite in one of the runs: those that were not followed behind the decays.
+bool runs_away(const Trial& trial) {
+  return std::any_of(trial.variance.begin(), trial.variance.end(), [](double variance) { return !(variance < run_away); });
 }
 
 bool is_among(const std::vector<std::string>& ids, const std::string& id) { return std::find(ids.begin(), ids.end(), id) != ids.end(); }
@@ -60,8 +66,8 @@ Eigen::VectorXd start_of(Form form, const BesideUnknownForces& beside) {
 
 }  // namespace
 
-LawSearch::LawSearch(FitProblem& problem, const Trial& base, Asked leaves_something, Asked is_noise, Among among)
-    : problem_(problem), base_(base), leaves_something_(std::move(leaves_something)), is_noise_(std::move(is_noise)), among_(among) {}
+LawSearch::LawSearch(FitProblem& problem, const Trial& base, Asked leaves_something, Asked is_no_law, Among among)
+    : problem_(problem), base_(base), leaves_something_(std::move(leaves_something)), is_no_law_(std::move(is_no_law)), among_(among) {}
 
 /// What `which` of the forms promise to first order at the best of their starts, where they stand then; -inf for those at work and for all others. The rig gets these.
 std::vector<double> LawSearch::screen_forms(const Trial& base, const Screening& screening, std::vector<Form>& forms, const std::vector<std::size_t>& which) {
@@ -150,6 +156,7 @@ LawSearch::Prospects LawSearch::prospects(const Trial& base, std::vector<Trial> 
     is_law.push_back(brings_a_law(trial));
     double& most = is_law.back() ? found.promised.by_a_law : found.promised.by_a_signal;
     most = std::max(most, trial.score);
+    if (!is_law.back()) found.promised.left_by_a_signal = std::min(found.promised.left_by_a_signal, trial.promised_left);
   }
   const bool all = among_ == Among::forms, any = found.promised.by_a_law >= found.promised.by_a_signal;
   for (std::size_t i = 0; i < screened.size(); ++i)
@@ -185,6 +192,7 @@ std::vector<Trial> LawSearch::followed(std::vector<Trial> tried, const Trial& ba
     });
   const auto excess = [](const Trial& t) { return std::max(0.0, left_of_decays(t) - 1); };
   const auto follows_decays = [&](const Trial& t) { return !t.ruled_out && (!by_decays || excess(t) < explained - 1); };
+  const auto is_near = [&](const Trial& t) { return !by_decays || left_of_decays(t) < nearly_explained; };  // what leaves more of the decays is at most what another law acts beside
   std::vector<Trial> all;
   double least = INFINITY;
   for (std::size_t first = 0, end = 0; first < tried.size(); first = end) {
@@ -205,7 +213,7 @@ std::vector<Trial> LawSearch::followed(std::vector<Trial> tried, const Trial& ba
     for (std::size_t i = first; i < end; ++i)
       if (!tried[i].ruled_out && !(by_decays && excess(tried[i]) > 2 * least)) all.push_back(std::move(tried[i]));
     in_parallel(all.size() - before, [&](std::size_t i) {
-      if (!driven) follow_further(all[before + i], INFINITY);
+      if (!driven && is_near(all[before + i])) follow_further(all[before + i], INFINITY);
     });
     if (one_will_do && std::any_of(all.begin(), all.end(), leaves_nothing)) break;
   }
@@ -215,18 +223,16 @@ std::vector<Trial> LawSearch::followed(std::vector<Trial> tried, const Trial& ba
 
 /// To first order: then they are tried before any form.
 bool LawSearch::signals_leave_nothing(const Promised& promised) const {
-  double noise = 0, all = 0;  // what noise makes of chi-square where runs that are not explained are weighted down
-  for (std::size_t r = 0; r < base_.variance.size(); ++r) {
-    const auto samples = static_cast<double>(base_.arrival.joint.runs()[r].run().samples());
-    noise += samples / std::max(1.0, base_.variance[r]);
-    all += samples;
-  }
-  return promised.by_a_signal > promised.by_a_law && 1 - promised.by_a_signal < explained * noise / all;
+  double noise = 0;  // what it makes of chi-square where runs that are not explained are weighted down
+  for (std::size_t r = 0; r < base_.variance.size(); ++r) noise += static_cast<double>(base_.arrival.joint.runs()[r].run().samples()) / std::max(1.0, base_.variance[r]);
+  return promised.by_a_signal > promised.by_a_law && promised.left_by_a_signal < explained * noise;
 }
 
 /// Whether the best of these, the first, asks for another law beside it.
 bool LawSearch::goes_on(const std::vector<Trial>& tried) const {
-  return !tried.empty() && tried.front().effects.size() < most_effects && leaves_something_(tried.front()) && bic_difference(tried.front(), base_) < 0 && !is_noise_(tried.front());
+  if (tried.empty() || tried.front().effects.size() >= most_effects || runs_away(tried.front()) || !leaves_something_(tried.front())) return false;
+  const bool takes_from_decays = shows_in_decays(base_) && left_of_decays(tried.front()) < half_of_it * left_of_decays(base_);  // other runs may not have been followed
+  return (takes_from_decays || bic_difference(tried.front(), base_) < 0) && !is_no_law_(tried.front());
 }
 
 /// A search among many ends before the least chi-square of any: where it is near, the first is taken there before it is asked what it leaves. Of runs that are driven, from first guesses with what is known of the law by now.
@@ -255,39 +261,33 @@ std::vector<Trial> LawSearch::search() {
     return ids;
   };
   tell(base_);
-  Promised promised, beside_first;
-  std::vector<std::string> first_of_the_list;  // beside which laws of the list were looked for
+  Promised promised;
   if (among_ == Among::laws_and_forms) {
     screened_ = screened_beside(base_, listed(base_));
     Prospects laws = prospects(base_, screened_, {});
     promised = laws.promised;
     follow(std::move(laws), base_);
-    if (goes_on(all) && all.front().excess() < half_of_it * base_.excess()) {
-      const Trial first = all.front();
-      Prospects second = prospects(first, screened_beside(first, listed(first)), {});
-      beside_first = second.promised;
-      first_of_the_list = first.effects;
-      follow(std::move(second), first);
-    }
   }
   if (signals_leave_nothing(promised)) return all;
+  asked_forms_ = true;
   follow(rivals(promised, all), base_);
   if (goes_on(all)) {
-    const Trial first = all.front();
+    Trial first = all.front();
     tell(first);
-    const bool asked = first.effects == first_of_the_list;
-    std::vector<std::string> ids = asked ? std::vector<std::string>() : listed(first);
-    const std::vector<std::string> forms = forms_worth_a_fit(first, asked ? beside_first : Promised());
-    ids.insert(ids.end(), forms.begin(), forms.end());
-    follow(prospects(first, screened_beside(first, ids), asked ? beside_first : Promised()), first);
+    if (!first.is_settled && !decays_decide(first) && !all_driven(first.arrival.joint)) settle(first);  // its motions may not have been followed, along which the second is to be seen
+    Prospects second = prospects(first, screened_beside(first, listed(first)), {});
+    promised = second.promised;
+    follow(std::move(second), first);
+    if (goes_on(all)) follow(prospects(first, screened_beside(first, forms_worth_a_fit(first, promised)), promised), first);
   }
   if (!all.empty() && all.front().effects.size() > 1) {
     problem_.rig.laws = all.front().arrival.joint.model().rig().laws;
     for (Trial& fewer : taken_away(problem_, all.front())) all.push_back(std::move(fewer));
   }
   in_parallel(all.size(), [&](std::size_t i) {  // rivals are told apart by less than where a search among many ends
-    if ((leaves_nothing(all[i]) || i == 0) && !decays_decide(all[i]) && !all[i].is_settled) settle(all[i]);
+    if ((leaves_nothing(all[i]) || (i == 0 && all[i].reduced_chi2() < nearly_explained)) && !decays_decide(all[i]) && !all[i].is_settled) settle(all[i]);
   });
+  std::erase_if(all, runs_away);
   sort_by(all, [&](const Trial& t) { return bic_difference(t, base_); });
   return all;
 }

@@ -1,4 +1,5 @@
 #pragma once
+#include <cmath>
 #include <functional>
 #include <string>
 #include <vector>
@@ -27,18 +28,21 @@ class LawSearch {
   enum class Among { forms, laws_and_forms };
 
   using Asked = std::function<bool(const Trial&)>;
-  /// `problem` lives as long as what is found, and its rig gets the laws that are tried. `leaves_something`: whether a fit does; `is_noise`: whether noise of a colour explains that.
-  LawSearch(FitProblem& problem, const Trial& base, Asked leaves_something, Asked is_noise, Among among);
+  /// `problem` lives as long as what is found, and its rig gets the laws that are tried. `leaves_something`: whether a fit does; `is_no_law`: whether
+  /// noise of a colour explains that, or the rig's description.
+  LawSearch(FitProblem& problem, const Trial& base, Asked leaves_something, Asked is_no_law, Among among);
 
   /// All sets that were fitted in full, `base` with one law more or two, the best first; empty where no form explains anything.
   std::vector<Trial> search();
   /// Effects of the list as they were screened beside `base`, each by itself; none where the list was not asked.
   std::vector<Trial> take_screened() { return std::move(screened_); }
+  /// Whether forms of the dictionary were looked for beside `base`.
+  bool asked_forms() const { return asked_forms_; }
 
  private:
-  /// Largest share of chi-square that was promised to first order.
+  /// Largest share of what a fit leaves that was promised to first order; least chi-square that a signal promised to leave.
   struct Promised {
-    double by_a_law = 0, by_a_signal = 0;
+    double by_a_law = 0, by_a_signal = 0, left_by_a_signal = INFINITY;
   };
   /// Sets with one law more, as they are to be fitted.
   struct Prospects {
@@ -59,9 +63,10 @@ class LawSearch {
 
   FitProblem& problem_;
   const Trial& base_;
-  Asked leaves_something_, is_noise_;
+  Asked leaves_something_, is_no_law_;
   Among among_;
   std::vector<Trial> screened_;
+  bool asked_forms_ = false;
 };
 
 }  // namespace unrig

@@ -219,7 +219,7 @@ void glance(Trial& trial, bool only) {
 
 Trial screened(const FitProblem& problem, const Screening& screening, const Trial& base, const std::vector<std::string>& effects) {
   Screening::Extended extended = screening.extend(model_with(problem, effects), added_to(base, effects));
-  Trial trial{effects, std::move(extended.arrival), extended.share};
+  Trial trial{effects, std::move(extended.arrival), extended.left, extended.share};
   if (any_aside(trial.arrival.joint)) trial.decays = base.decays;
   return trial;
 }
@@ -247,7 +247,7 @@ Trial prepare(const FitProblem& problem, const Trial& base, const std::vector<st
   Trial fewer{effects, transferred(problem, base.arrival, model_with(problem, effects))};
   if (any_aside(fewer.arrival.joint)) fewer.decays = base.decays;
   glance(fewer, true);
-  fewer.score = promised_share(fewer.arrival.joint, base.arrival.joint.chi2());
+  fewer.promised_left = left_by_a_step(fewer.arrival.joint);
   hold_undetermined(fewer.arrival.joint);
   glance(fewer, false);
   return fewer;
@@ -267,14 +267,22 @@ void settle(Trial& trial) {
 
 namespace {
 
-/// Whether a step from where the fit stands without an effect leaves far more than what it saves in parameters: of signals, which such a step follows.
+/// Whether the decays show that a law is missed: of thousands of samples twice the excess is beyond any evidence.
+bool is_missed_by_decays(Trial& fewer, const Trial& with) {
+  if (!has_decays(fewer.arrival.joint) || any_aside(with.arrival.joint) || !nonlinear(fewer)) return false;
+  fit_decays(fewer.arrival.joint, fewer.effects.back(), true);
+  measure(fewer);
+  return left_of_decays(fewer) - 1 > 2 * std::max(left_of_decays(with), explained) - 2;
+}
+
+/// Whether an effect is missed before anything is fitted without it. Of a signal, if a step from where the fit stands leaves far more than what it saves in parameters: a step follows signals.
 bool is_missed(Trial& fewer, const Trial& with, const std::string& id) {
   const JointProblem& joint = with.arrival.joint;
-  if (is_a_law(id, AeroelasticModel(joint.model().rig(), joint.model().basis(), joint.model().circulation()), joint)) return false;
+  if (is_a_law(id, AeroelasticModel(joint.model().rig(), joint.model().basis(), joint.model().circulation()), joint)) return is_missed_by_decays(fewer, with);
   measure(fewer);
   double samples = 0;
   for (const double n : with.samples) samples += n;
-  const double lost = -fewer.score * joint.chi2(), saved = (with.variables - fewer.variables) * std::log(samples);
+  const double lost = fewer.promised_left - joint.chi2(), saved = (with.variables - fewer.variables) * std::log(samples);
   return half_of_it * lost > saved + decisive;
 }
 
@@ -442,7 +450,7 @@ Arrival arrive_at_effects(const FitProblem& problem) {
 
 void fit_from_first_guesses(const FitProblem& problem, Trial& trial) {
   const ArrivalEffort effort{false, 10, 0.5, 15};
-  Trial other{trial.effects, arrive_with_effects(problem, trial.arrival, effort), trial.score};
+  Trial other{trial.effects, arrive_with_effects(problem, trial.arrival, effort), trial.promised_left, trial.score};
   temper(other.arrival.joint);
   anneal(other.arrival, 5);
   measure(other);

@@ -14,7 +14,8 @@ namespace unrig {
 struct Trial {
   std::vector<std::string> effects;
   Arrival arrival;
-  double score = 0;               ///< share of chi-square that one linear step promised to remove, at the noise levels of the time
+  double promised_left = INFINITY;  ///< chi-square that one linear step promised to leave, at the noise levels of the time
+  double score = 0;               ///< share of what a step without its last effect leaves, that was promised to go; 0 where none was added
   std::vector<double> variance = {};   ///< per run: residual power over noise power
   std::vector<double> samples = {};    ///< per run: as many of them as the residual's colour leaves independent
   std::vector<double> angle_variance = {}, angle_samples = {};  ///< the same of the angle, where the motion is estimated; no samples elsewhere

@@ -33,10 +33,12 @@ LinearStep linear_step(const MatrixXd& columns, const VectorXd& r) {
 FirstOrder::FirstOrder(const JointProblem& joint) : joint_(joint) {
   std::vector<std::unique_ptr<RunResidual::FirstOrder>> runs(joint.runs().size());
   in_parallel(runs.size(), [&](std::size_t r) { runs[r] = std::make_unique<RunResidual::FirstOrder>(joint.runs()[r], joint.theta(r)); });
-  for (std::size_t r = 0; r < runs.size(); ++r) {
-    runs_.push_back(std::move(*runs[r]));
-    if (runs_[r].known() && !joint.runs()[r].is_aside()) chi2_ += runs_[r].left().squaredNorm();
-  }
+  for (auto& run : runs) runs_.push_back(std::move(*run));
+  if (!known()) return;
+  std::vector<Beside> alone(runs_.size());
+  for (std::size_t r = 0; r < runs_.size(); ++r)
+    if (!joint.runs()[r].is_aside()) alone[r] = {runs_[r].slopes(), runs_[r].left()};
+  left_ = step({}, {}, alone).left;
 }
 
 bool FirstOrder::known() const {
@@ -108,14 +110,14 @@ FirstOrder::Promise FirstOrder::promise(const JointProblem& with, const std::str
     of_effect.push_back(u);
     if (std::find(own.begin(), own.end(), u.parameter) == own.end()) own.push_back(u.parameter);
   }
-  Promise promise{-INFINITY, 0};
+  Promise promise;
   std::vector<VectorXd> begins(runs_.size());  // of states that only `with` has
   constexpr int steps = 2;  // the shape of a signal has no slope before its amplitude is told
   for (int i = 0; i < steps; ++i) {
     const std::vector<Beside> rows = beside(with, id, own, begins);
     if (std::any_of(rows.begin(), rows.end(), [](const Beside& run) { return !run.left.allFinite(); })) break;
     const LinearStep to = step(of_effect, own, rows);
-    promise.share = std::max(promise.share, 1 - to.left / chi2_);
+    promise.left = std::min(promise.left, to.left);
     Index column = static_cast<Index>(joint_.unknowns().size() + of_effect.size());
     const bool has_states = to.x.size() > column;
     for (std::size_t r = 0; r < rows.size(); ++r) {

@@ -1,4 +1,5 @@
 #pragma once
+#include <cmath>
 #include <Eigen/Core>
 #include <string>
 #include <vector>
@@ -22,9 +23,11 @@ class FirstOrder {
   explicit FirstOrder(const JointProblem& joint);
   /// Not of a fit in which a force wanders or the model runs away, but for runs that are set aside.
   bool known() const;
+  /// Chi-square that one linear step in the fit's own unknowns leaves.
+  double left() const { return left_; }
 
   struct Promise {
-    double share = 0;             ///< of chi-square that one linear step in all unknowns removes, those of `with` included; minus infinity where a model runs away
+    double left = INFINITY;       ///< chi-square that one linear step in all unknowns leaves, those of `with` included; infinite where a model runs away
     double largest_argument = 0;  ///< that the laws' first arguments reach
   };
   /// `with`: the same runs with effect `id` beside, with the shape that it stands at and a size (its first parameter, or where the states of a tone begin) that is next to nothing.
@@ -38,7 +41,7 @@ class FirstOrder {
 
   const JointProblem& joint_;
   std::vector<RunResidual::FirstOrder> runs_;
-  double chi2_ = 0;
+  double left_ = 0;
 };
 
 }  // namespace unrig

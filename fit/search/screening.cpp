@@ -64,16 +64,23 @@ void glance(JointProblem& joint, bool only) {
 
 }  // namespace
 
-double promised_share(const JointProblem& joint, double before) {
+double left_by_a_step(const JointProblem& joint) {
   const JointProblem::Linearisation lin = joint.linearise();
   std::vector<Index> free;
   for (std::size_t i = 0; i < joint.unknowns().size(); ++i)
     if (!joint.unknowns()[i].held && lin.jacobian.col(static_cast<Index>(i)).norm() > 0) free.push_back(static_cast<Index>(i));
-  if (free.empty() || !lin.residual.allFinite()) return -INFINITY;  // the model runs away from where it would start
-  return 1 - linear_step(lin.jacobian(Eigen::all, free), lin.residual).left / before;
+  if (!lin.residual.allFinite()) return INFINITY;
+  return linear_step(lin.jacobian(Eigen::all, free), lin.residual).left;
 }
 
 Screening::Screening(const FitProblem& problem, const Arrival& without) : problem_(problem), without_(without), base_(without.joint) {
+  if (base_.first_order.known()) {
+    left_ = base_.first_order.left();
+  } else {
+    JointProblem alone = without.joint;
+    glance(alone, true);
+    left_ = left_by_a_step(alone);
+  }
   constexpr double astray = 10;
   JointProblem moved = without.joint;
   if (!back_to_the_rig(moved, astray)) return;
@@ -122,11 +129,11 @@ JointProblem Screening::best_start(const JointProblem& joint, const std::string&
   }
   const bool with_motions = std::any_of(joint.runs().begin(), joint.runs().end(), [](const RunResidual& run) { return run.motion().unknowns() > 0; });
   if ((with_motions || is_law_id(id)) && is_law(joint, id) && judge().first_order.known()) {
-    double most = -INFINITY;
+    double least = INFINITY;
     VectorXd chosen = starts.front();
     for (const VectorXd& start : starts) {
       set_values(best, id, start);
-      if (const double share = judge().first_order.promise(best, id).share; share > most) most = share, chosen = start;
+      if (const double left = judge().first_order.promise(best, id).left; left < least) least = left, chosen = start;
     }
     set_values(best, id, chosen);
     return best;
@@ -174,7 +181,8 @@ Screening::Extended Screening::extend(const std::shared_ptr<const AeroelasticMod
   if (!at_the_rig_) joint = std::move(looked_at);
   set_starts(joint, problem_.start);
   const bool to_first_order = added.size() == 1 && base_.first_order.known() && is_law(joint, added.front());
-  extended.share = to_first_order ? base_.first_order.promise(joint, added.front()).share : promised_share(joint, without_.joint.chi2());
+  extended.left = to_first_order ? base_.first_order.promise(joint, added.front()).left : left_by_a_step(joint);
+  extended.share = 1 - extended.left / left_;
   glance(joint, false);
   return extended;
 }

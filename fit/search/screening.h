@@ -20,7 +20,8 @@ class Screening {
 
   struct Extended {
     Arrival arrival;
-    double share = 0;  ///< of chi-square that one linear step in all unknowns promises to remove; minus infinity where the model runs away
+    double left = 0;   ///< chi-square that one linear step in all unknowns promises to leave; infinite where the model runs away
+    double share = 0;  ///< which it promises to remove of what a step in the unknowns of the fit leaves: a fit that ended early is no mismatch that any effect takes away
   };
   /// With `model`, the one with the effects `added`, and nothing searched for yet: values of the fit without them where it has them, the best of their starts for the effects. Starts of a law are
   /// compared, and what it promises is told, to first order about the fit (fit/search/first_order.h); of other effects by chi-square, all linear unknowns at their best.
@@ -45,6 +46,7 @@ class Screening {
   const FitProblem& problem_;
   const Arrival& without_;
   Base base_;
+  double left_ = 0;  // by a step in the unknowns of the fit
   std::unique_ptr<const Base> at_the_rig_;     // where parameters of the fit have gone astray: what a rig moves by there says nothing of the size of a force
   std::optional<BesideUnknownForces> beside_;  // then, where there are decays
 };
@@ -52,7 +54,7 @@ class Screening {
 /// With `model`, the one of other effects: values, noise and c of the fit `without` them where it has them.
 Arrival transferred(const FitProblem& problem, const Arrival& without, const std::shared_ptr<const AeroelasticModel>& model);
 
-/// Share of chi-square, `before`, that one linear step in all unknowns removes.
-double promised_share(const JointProblem& joint, double before);
+/// Chi-square that one linear step in all unknowns leaves; infinite where the model runs away from where it would start.
+double left_by_a_step(const JointProblem& joint);
 
 }  // namespace unrig

@@ -66,15 +66,14 @@ TEST(FirstOrder, PromisesWhatTheWholeLinearisationDoes) {
   const FirstOrder first_order(baseline().arrival.joint);
   ASSERT_TRUE(first_order.known());
   const Screening screening(campaign(), baseline().arrival);
-  const double chi2 = baseline().arrival.joint.chi2();
   int held_against = 0;
   for (const std::string& id : laws()) {
     JointProblem joint = screening.extend(model_with(id), {id}).arrival.joint;
     if (takes_small_steps(joint)) continue;  // corners have no slope that both would see alike
-    const double promised = first_order.promise(joint, id).share;
+    const double promised = 1 - first_order.promise(joint, id).left / first_order.left();
     Unknown& size = *unknowns_of(joint, id).front();
     if (!effect(id).frequency) size.value = std::clamp(1e-3 * size.value, joint.parameter(size).lower, joint.parameter(size).upper);
-    const double whole = promised_share(joint, chi2);
+    const double whole = 1 - left_by_a_step(joint) / first_order.left();
     EXPECT_NEAR(promised, whole, 0.05 * whole) << id << ": 0.049 for speed-surge, whose amplitude is told in two steps here and there";
     ++held_against;
   }
@@ -96,7 +95,7 @@ TEST(FirstOrder, AToneIsAskedForAtItsOwnFrequency) {
   JointProblem joint = transferred(with_line, base.arrival, model).joint;
   const auto promised_at = [&](double frequency) {
     unknowns_of(joint, "speed-surge").front()->value = frequency;
-    return first_order.promise(joint, "speed-surge").share;
+    return 1 - first_order.promise(joint, "speed-surge").left / first_order.left();
   };
   // Not all of the line: a surge acts by the load, which changes in a step.
   EXPECT_GT(promised_at(2), 0.2);
