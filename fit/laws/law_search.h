@@ -15,11 +15,13 @@ namespace unrig {
 /// 1. Every form of the dictionary, its force sent through the rig onto the readings beside all unknowns of the fit (Screening): the share of chi-square that it promises to first order. At several shapes where the first
 ///    promises something.
 /// 2. The coefficients of those that promise most, and where they are seen decisively the shapes, from states that the free decays ask for beside unknown accelerations (beside_unknown_forces, screen).
-/// 3. These are fitted with all their parameters free: to the free decays first, then to all runs; runs that are driven from first guesses. All are held against each other by BIC.
-/// 4. Where the best leaves something, a second law is looked for beside it, and what that makes superfluous is taken away.
+/// 3. These are fitted with all their parameters free: to the free decays first, then to all runs unless they leave more than ten times its noise of the decays; runs that are driven from first guesses. All are held against
+///    each other by BIC.
+/// 4. Where the best leaves something that is no noise of a colour and that the rig's description does not explain, a second law is looked for beside it, of the list first, then of the dictionary, and what that makes
+///    superfluous is taken away.
 ///
-/// Before anything else was tried (Among::laws_and_forms) laws are looked for where one of them promises most of all effects, signals included, to first order, and only what promises half as much: laws of the list, one and a second
-/// beside it, and forms, which are their rivals; no forms where a signal promises to leave nothing.
+/// Before anything else was tried (Among::laws_and_forms) laws are looked for where one of them promises most of all effects, signals included, to first order, and only what promises half as much: laws of the list, then
+/// forms, which are their rivals; no forms where a signal promises to leave nothing.
 ///
 /// Source: M. Alvarez, D. Luengo and N. Lawrence, Latent force models, AISTATS (2009); S. L. Brunton, J. L. Proctor and J. N. Kutz, PNAS 113 (2016) 3932, whose candidates are regressed on derivatives, here on readings.
 class LawSearch {

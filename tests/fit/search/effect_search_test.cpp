@@ -6,6 +6,7 @@
 
 #include <cmath>
 #include <memory>
+#include <numbers>
 #include <string>
 #include <vector>
 
@@ -107,6 +108,48 @@ TEST(TakenAway, IsWhatNothingIsLostWithout) {
   Trial with = prepare(problem, clean, {"mains-hum", "gauge-drift"});
   fit_fully(with, 6);
   EXPECT_EQ(taken_away(problem, with).size(), 1u);
+}
+
+/// Released from 5, with a spring that grows by `hardening` of itself there and dry friction of `friction` of its force: steps of Runge and Kutta, 16 a sample.
+VectorXd nonlinear_decay(double hardening, double friction) {
+  const double omega = 2 * std::numbers::pi * one_mode::hertz, release = 5, slip = 1e-3 * omega * release;
+  const auto rate = [&](const Eigen::Vector2d& s) {
+    const double cubed = std::pow(s[0] / release, 2) * s[0];
+    return Eigen::Vector2d(s[1], -2 * one_mode::damping_ratio * omega * s[1] - omega * omega * (s[0] + hardening * cubed + friction * release * std::tanh(s[1] / slip)));
+  };
+  constexpr int parts = 16;
+  const double h = one_mode::dt / parts;
+  Eigen::Vector2d state(release, 0);
+  VectorXd reading(samples);
+  for (Index k = 0; k < samples; ++k) {
+    reading[k] = state[0];
+    for (int i = 0; i < parts; ++i) {
+      const Eigen::Vector2d a = rate(state), b = rate(state + h / 2 * a), c = rate(state + h / 2 * b), d = rate(state + h * c);
+      state += h / 6 * (a + 2 * b + 2 * c + d);
+    }
+  }
+  return reading;
+}
+
+/// Laws too: of two that act neither goes, of one that does not act beside one that does the idle one, in whichever order.
+TEST(TakenAway, IsNoLawThatTheDecaysMiss) {
+  FitProblem problem;
+  problem.rig = one_mode::rig();
+  const auto left_of = [&](double friction, const std::vector<std::string>& both) {
+    problem.runs = {one_mode::decay("decay.csv", nonlinear_decay(0.2, friction) + 0.02 * one_mode::white_noise(samples, 9))};
+    Trial with = fit_baseline(problem);
+    for (const std::size_t count : {1, 2}) {
+      Trial next = prepare(problem, with, {both.begin(), both.begin() + static_cast<std::ptrdiff_t>(count)});
+      EXPECT_TRUE(follow_nonlinear(problem, next, with, INFINITY));
+      with = std::move(next);
+    }
+    EXPECT_LT(with.reduced_chi2(), explained);
+    return taken_away(problem, with);
+  };
+  EXPECT_TRUE(left_of(0.01, {"cubic-stiffness", "coulomb-friction"}).empty());
+  const std::vector<Trial> fewer = left_of(0, {"cubic-stiffness", "coulomb-friction"});
+  ASSERT_EQ(fewer.size(), 1u);
+  EXPECT_EQ(fewer.front().effects, std::vector<std::string>{"cubic-stiffness"});
 }
 
 }  // namespace
