@@ -135,6 +135,7 @@ class TemporaryFile {
   }
   ~TemporaryFile() {
     if (named_) ::unlink(path_.c_str());
+    if (placed_) ::unlink(target_.c_str());
   }
   TemporaryFile(const TemporaryFile&) = delete;
   TemporaryFile& operator=(const TemporaryFile&) = delete;
@@ -142,11 +143,18 @@ class TemporaryFile {
   bool take_mode(mode_t mode) const { return file_.is_open() && ::fchmod(file_.number(), mode & 07777) == 0; }
   /// These give false with errno where a step fails. fsync comes before the name: a crash leaves the old file or the whole new one.
   bool write(const TextSource& text) const { return file_.is_open() && write_pieces(file_.number(), text) && ::fsync(file_.number()) == 0; }
+  /// That of a target which is not there yet; beside one that is there a name of its own, which is left where the process is killed before it is the target's.
   bool take_name() {
-    if (!named_) named_ = ::linkat(AT_FDCWD, link().c_str(), AT_FDCWD, path_.c_str(), AT_SYMLINK_FOLLOW) == 0;
-    return named_ && file_.close();
+    const auto linked_as = [&](const fs::path& name) { return ::linkat(AT_FDCWD, link().c_str(), AT_FDCWD, name.c_str(), AT_SYMLINK_FOLLOW) == 0; };
+    if (!named_) placed_ = linked_as(target_);
+    if (!named_ && !placed_) named_ = linked_as(path_);
+    return (named_ || placed_) && file_.close();
   }
   bool replace_target() {
+    if (placed_) {
+      placed_ = false;
+      return true;
+    }
     if (::rename(path_.c_str(), target_.c_str()) != 0) return false;
     named_ = false;
     return true;
@@ -170,7 +178,7 @@ class TemporaryFile {
   fs::path target_;
   std::string path_;
   OpenFile file_;
-  bool named_ = false;
+  bool named_ = false, placed_ = false;  // placed: in the place of a target that was not there
 };
 
 /// The rename itself lives in the directory; where a file system cannot flush directories the file is written all the same.

@@ -4,6 +4,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <signal.h>
+#include <sys/inotify.h>
 #include <sys/stat.h>
 #include <sys/wait.h>
 #include <unistd.h>
@@ -12,6 +13,7 @@
 #include <stdexcept>
 #include <string>
 #include <thread>
+#include <vector>
 
 #include "core/files/error.h"
 #include "core/files/together.h"
@@ -117,6 +119,44 @@ TEST(TextFile, LeavesNoTemporaryFileBehind) {
   const TemporaryDirectory directory;
   write_text(directory.path("a.txt"), "one");
   write_text(directory.path("a.txt"), "two");
+  EXPECT_EQ(files_in(directory.path("")), 1u);
+}
+
+/// Names that come up in a folder from here on.
+class NewNames {
+ public:
+  explicit NewNames(const fs::path& folder) : file_(::inotify_init1(IN_NONBLOCK)) { ::inotify_add_watch(file_, folder.c_str(), IN_CREATE); }
+  ~NewNames() { ::close(file_); }
+  NewNames(const NewNames&) = delete;
+  NewNames& operator=(const NewNames&) = delete;
+
+  std::vector<std::string> so_far() const {
+    alignas(inotify_event) char events[4096];
+    std::vector<std::string> names;
+    const ssize_t size = ::read(file_, events, sizeof events);
+    for (ssize_t at = 0; at < size;) {
+      const auto* event = reinterpret_cast<const inotify_event*>(events + at);
+      names.emplace_back(event->name);
+      at += static_cast<ssize_t>(sizeof(inotify_event) + event->len);
+    }
+    return names;
+  }
+
+ private:
+  int file_;
+};
+
+/// Where nothing is yet the file takes its own name at once: no kill leaves another.
+TEST(TextFile, WhatIsNewHasNoOtherNameBefore) {
+  const TemporaryDirectory directory;
+  const int without_name = ::open(directory.path("").c_str(), O_WRONLY | O_TMPFILE, 0666);
+  if (without_name < 0) GTEST_SKIP() << "this file system has no files without a name";
+  ::close(without_name);
+  const NewNames names(directory.path(""));
+  write_text(directory.path("new.json"), "new");
+  EXPECT_EQ(names.so_far(), std::vector<std::string>{"new.json"});
+  write_text(directory.path("new.json"), "newer");
+  EXPECT_EQ(read_text(directory.path("new.json")), "newer");
   EXPECT_EQ(files_in(directory.path("")), 1u);
 }
 
