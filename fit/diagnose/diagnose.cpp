@@ -365,7 +365,7 @@ Diagnosis diagnose_in_order(const DiagnoseProblem& problem, bool numbers_known) 
   if (coloured) d.mismatch = locate_mismatch(baseline.arrival.joint);
   std::optional<RigDescription> description;
   // What is far from explained by a step in the rig's numbers is asked about last.
-  const double far_away = 1 - (nearly_explained - 1) / (baseline.reduced_chi2() - 1);
+  const double above_noise = std::max(nearly_explained, baseline.reduced_chi2()) - 1, far_away = 1 - (nearly_explained - 1) / above_noise;
   if (d.mismatch.found && !numbers_known) limits.spend([&] { description = describe_rig(problem, baseline, std::max(half_of_it, far_away)); });
   const bool described_already = description && description->left < explained;
   // What a set leaves may be noise that is not white, in which all is to be held against each other anew, or the rig's description.
