@@ -66,7 +66,7 @@ struct Candidate {
   double reduced_chi2 = 0;   ///< of the fitted runs, after the fit
   double delta_bic = 0;      ///< against the fit with nothing missing; negative is better
   double probability = 0;    ///< exp(-BIC/2) over the sum of it over all sets tried; 0 of one of lower BIC than what is named, which leaves something or predicts worse
-  double score = 0;          ///< share of the excess of chi-square that one linear step promised to remove (first round only)
+  double score = 0;          ///< share of what a step without the last effect leaves, that one with it promised to remove (first round only); of the rig's description of the excess of chi-square
   SearchOutcome search = SearchOutcome::complete;
 };
 
