@@ -15,13 +15,12 @@
 #include "core/files/error.h"
 #include "core/law/law_effect.h"
 #include "core/rig/fingerprint.h"
-#include "core/numerics/time_limit.h"
-#include "core/numerics/work.h"
 #include "fit/diagnose/as_given.h"
 #include "fit/diagnose/exact_model.h"
 #include "fit/diagnose/explanation.h"
 #include "fit/diagnose/law_answer.h"
 #include "fit/diagnose/rig_description.h"
+#include "fit/diagnose/search_limits.h"
 #include "fit/diagnose/selection.h"
 #include "fit/laws/law_search.h"
 #include "fit/search/decays_first.h"
@@ -36,46 +35,6 @@ namespace {
 using Eigen::Index;
 
 constexpr double twice_the_noise = 2;
-
-/// What a diagnosis may take, over the parts of it that search.
-class SearchLimits {
- public:
-  explicit SearchLimits(const DiagnoseProblem& problem) : until_(problem.limit > 0 ? processor_seconds() + problem.limit : INFINITY), most_(problem.work > 0 ? problem.work : INFINITY) {}
-
-  bool are_reached() const { return are_reached_; }
-  /// 1e9 multiplications.
-  double work() const { return done_; }
-  /// Searches unless a limit is reached; what the search has changed by then stands.
-  void spend(const std::function<void()>& search) {
-    if (are_reached_) return;
-    const std::uint64_t before = work_done();
-    are_reached_ = !is_done_within(until_, most_ - done_, search);
-    done_ += static_cast<double>(work_done() - before) / billion;
-    are_reached_ = are_reached_ || done_ > most_;
-  }
-  /// Whether the description of what was found is done within a quarter of what a search may usually take; of a search without limits always.
-  bool describe(const std::function<void()>& description) const {
-    constexpr double quarter = 0.25;
-    return is_done_within(std::isinf(until_) ? until_ : processor_seconds() + quarter * usual_seconds, std::isinf(most_) ? most_ : quarter * usual_work, description);
-  }
-
- private:
-  static constexpr double billion = 1e9;
-  static bool is_done_within(double until, double most, const std::function<void()>& task) {
-    constexpr double any = 1e9;
-    const TimeLimit time(until);
-    const WorkLimit work(static_cast<std::uint64_t>(billion * std::min(any, most)));
-    try {
-      task();
-      return !TimeLimit::is_lifted();
-    } catch (const OutOfTime&) {
-      return false;
-    }
-  }
-
-  double until_, most_, done_ = 0;
-  bool are_reached_ = false;
-};
 
 /// The fit with nothing missing and every run at its full weight, from where the baseline stands; `thorough`: or from first guesses and the starts around them, as `unrig fit` searches, where that leaves less. Whether it
 /// leaves so much less that the baseline, from which all else was searched, was no place to begin from.

@@ -19,21 +19,9 @@ using Eigen::VectorXd;
 constexpr Index samples = 400;
 constexpr double noise = 0.01;
 
-/// q'' + 2 zeta omega q' + omega^2 q + k_3 q^3 = 0 from q = `start` on, by Runge and Kutta's rule: 10 steps a sample leave 1e-9 of it.
+/// With a spring that hardens by k_3 q^3; 10 steps a sample leave 1e-9 of it.
 VectorXd hardening_decay(double start, double k3) {
-  constexpr int steps = 10;
-  const double omega = 2 * std::numbers::pi * one_mode::hertz, h = one_mode::dt / steps;
-  const auto slope = [&](const Eigen::Vector2d& x) { return Eigen::Vector2d(x[1], -2 * one_mode::damping_ratio * omega * x[1] - omega * omega * x[0] - k3 * x[0] * x[0] * x[0]); };
-  Eigen::Vector2d x(start, 0);
-  VectorXd q(samples);
-  for (Index k = 0; k < samples; ++k) {
-    q[k] = x[0];
-    for (int i = 0; i < steps; ++i) {
-      const Eigen::Vector2d a = slope(x), b = slope(x + h / 2 * a), c = slope(x + h / 2 * b), d = slope(x + h * c);
-      x += h / 6 * (a + 2 * b + 2 * c + d);
-    }
-  }
-  return q;
+  return one_mode::decay_beside([&](double q, double) { return k3 * q * q * q; }, start, samples, 10);
 }
 
 /// What a spring without hardening does that many times the rig's frequency.

@@ -45,6 +45,23 @@ inline Eigen::MatrixX2d free_response(Index samples, double frequency, double ze
   return y;
 }
 
+/// q'' + 2 zeta omega q' + omega^2 q + beside(q, q') = 0 from rest at `start` on, by Runge and Kutta's rule in so many steps a sample.
+template <typename Force>
+VectorXd decay_beside(const Force& beside, double start, Index samples, int steps) {
+  const double omega = 2 * std::numbers::pi * hertz, h = dt / steps;
+  const auto slope = [&](const Eigen::Vector2d& x) { return Eigen::Vector2d(x[1], -2 * damping_ratio * omega * x[1] - omega * omega * x[0] - beside(x[0], x[1])); };
+  Eigen::Vector2d x(start, 0);
+  VectorXd q(samples);
+  for (Index k = 0; k < samples; ++k) {
+    q[k] = x[0];
+    for (int i = 0; i < steps; ++i) {
+      const Eigen::Vector2d a = slope(x), b = slope(x + h / 2 * a), c = slope(x + h / 2 * b), d = slope(x + h * c);
+      x += h / 6 * (a + 2 * b + 2 * c + d);
+    }
+  }
+  return q;
+}
+
 /// A free decay in air that reads this [N].
 inline Run decay(const std::string& file, const VectorXd& reading) {
   Run run;

@@ -110,25 +110,11 @@ TEST(TakenAway, IsWhatNothingIsLostWithout) {
   EXPECT_EQ(taken_away(problem, with).size(), 1u);
 }
 
-/// Released from 5, with a spring that grows by `hardening` of itself there and dry friction of `friction` of its force: steps of Runge and Kutta, 16 a sample.
+/// Released from 5, with a spring that grows by `hardening` of itself there and dry friction of `friction` of its force.
 VectorXd nonlinear_decay(double hardening, double friction) {
   const double omega = 2 * std::numbers::pi * one_mode::hertz, release = 5, slip = 1e-3 * omega * release;
-  const auto rate = [&](const Eigen::Vector2d& s) {
-    const double cubed = std::pow(s[0] / release, 2) * s[0];
-    return Eigen::Vector2d(s[1], -2 * one_mode::damping_ratio * omega * s[1] - omega * omega * (s[0] + hardening * cubed + friction * release * std::tanh(s[1] / slip)));
-  };
-  constexpr int parts = 16;
-  const double h = one_mode::dt / parts;
-  Eigen::Vector2d state(release, 0);
-  VectorXd reading(samples);
-  for (Index k = 0; k < samples; ++k) {
-    reading[k] = state[0];
-    for (int i = 0; i < parts; ++i) {
-      const Eigen::Vector2d a = rate(state), b = rate(state + h / 2 * a), c = rate(state + h / 2 * b), d = rate(state + h * c);
-      state += h / 6 * (a + 2 * b + 2 * c + d);
-    }
-  }
-  return reading;
+  const auto force = [&](double q, double v) { return omega * omega * (hardening * std::pow(q / release, 2) * q + friction * release * std::tanh(v / slip)); };
+  return one_mode::decay_beside(force, release, samples, 16);
 }
 
 /// Laws too: of two that act neither goes, of one that does not act beside one that does the idle one, in whichever order.
