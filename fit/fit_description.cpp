@@ -142,20 +142,36 @@ FittedRun describe_run(const RunResidual& residual, const VectorXd& theta, doubl
   return fitted;
 }
 
-std::vector<ChannelColour> noise_colours(const JointProblem& joint) {
+namespace {
+
+/// Channel by channel, over the noise.
+std::map<std::string, std::vector<RestResidual>> left_at_rest(const JointProblem& joint) {
   std::map<std::string, std::vector<RestResidual>> left;
   for (std::size_t r = 0; r < joint.runs().size(); ++r) {
     const RunResidual& run = joint.runs()[r];
     const RunResidual::Prediction p = run.predict(joint.theta(r));
     for (std::size_t c = 0; c < p.channels.size() && !run.is_aside(); ++c) {
-      if (sigma_of_inputs(run, joint.theta(r), c) > 0) continue;  // coloured by what drives the rig
+      if (sigma_of_inputs(run, joint.theta(r), c) > 0 || run.converter(c).step > 0) continue;  // coloured by what drives the rig, or reads it
       const VectorXd residual = (run.run().channel(p.channels[c]).value - p.output.col(static_cast<Index>(c))) / run.noise(c);
       left[p.channels[c]].push_back({run.at_rest(residual, run.channel_weight(c)), run.run().dt});
     }
   }
+  return left;
+}
+
+}  // namespace
+
+std::vector<ChannelColour> noise_colours(const JointProblem& joint) {
   std::vector<ChannelColour> colours;
-  for (const auto& [channel, residuals] : left)
+  for (const auto& [channel, residuals] : left_at_rest(joint))
     if (const std::optional<NoiseColour> colour = colour_of(residuals)) colours.push_back({channel, *colour});
+  return colours;
+}
+
+std::vector<ChannelColour> noise_colours_of_most(const JointProblem& joint) {
+  std::vector<ChannelColour> colours;
+  for (const auto& [channel, residuals] : left_at_rest(joint))
+    if (const std::optional<NoiseColour> colour = colour_of_most(residuals)) colours.push_back({channel, *colour});
   return colours;
 }
 

@@ -24,6 +24,8 @@ double reading_of_steady_load(const RunResidual& residual);
 
 /// The colour that the runs' readings have in common, channel by channel, from what the fit leaves of them at rest.
 std::vector<ChannelColour> noise_colours(const JointProblem& joint);
+/// That of most of them (colour_of_most): of a fit that may leave a mismatch in the others.
+std::vector<ChannelColour> noise_colours_of_most(const JointProblem& joint);
 
 FittedRun describe_run(const RunResidual& residual, const Eigen::VectorXd& theta, double chi2);
 

@@ -181,6 +181,29 @@ Motion interpolated_motion(const VectorXd& angle, double dt) {
   return motion;
 }
 
+namespace {
+
+/// Whether differences beyond `limit` come all over the record, as tails of noise do and transients do not: test of Kolmogorov and Smirnov of their places, failed once in a thousand. Differences that have
+/// a reading in common count as one. False where there are fewer than ten.
+bool come_all_over(const std::vector<double>& differences, double limit, int order) {
+  std::vector<double> place;
+  std::size_t last = 0;
+  for (std::size_t k = 0; k < differences.size(); ++k) {
+    if (!(differences[k] > limit)) continue;
+    if (place.empty() || k - last > static_cast<std::size_t>(order)) place.push_back((static_cast<double>(k) + 0.5) / static_cast<double>(differences.size()));
+    last = k;
+  }
+  constexpr std::size_t few = 10;
+  constexpr double once_in_a_thousand = 1.9495;
+  if (place.size() < few) return false;
+  const auto count = static_cast<double>(place.size());
+  double distance = 0;
+  for (std::size_t i = 0; i < place.size(); ++i) distance = std::max({distance, static_cast<double>(i + 1) / count - place[i], place[i] - static_cast<double>(i) / count});
+  return std::sqrt(count) * distance < once_in_a_thousand;
+}
+
+}  // namespace
+
 double noise_level(const VectorXd& channel, int order) {
   std::vector<double> differences;
   std::vector<double> binomial(static_cast<std::size_t>(order) + 1, 1);
@@ -192,9 +215,12 @@ double noise_level(const VectorXd& channel, int order) {
     for (int i = 0; i <= order; ++i) difference += binomial[static_cast<std::size_t>(i)] * channel[k + i];
     if (std::isfinite(difference)) differences.push_back(std::abs(difference));
   }
+  const std::vector<double> in_order = differences;
   const double robust = median_to_sigma * median(differences);
-  // The median alone wastes two thirds of the data: mean square of all that lies within 3.5 of it, over that of a normal cut off there.
-  constexpr double cut = 3.5, cut_variance = 0.99389;
+  // The median alone wastes two thirds of the data: mean square of all that lies within a cut, over that of a normal cut off there.
+  constexpr double near = 3.5, near_variance = 0.99389, far = 10;  // as far out as a reading that is kept (core/run/bad_readings.h)
+  const bool tails = come_all_over(in_order, near * robust, order);
+  const double cut = tails ? far : near, cut_variance = tails ? 1 : near_variance;
   double sum = 0;
   Index count = 0;
   for (double d : differences)

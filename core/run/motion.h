@@ -67,7 +67,7 @@ Motion motion_of(const Eigen::VectorXd& coefficients, double dt);
 Motion interpolated_motion(const Eigen::VectorXd& angle, double dt);
 
 /// Standard deviation of the white part of a channel: from its differences of order `order`, scaled by their gain sqrt(C(2 order, order)), cut
-/// off at 3.5 of their median so that transients and spikes do not count. A slowly varying signal is suppressed by (2 sin(omega dt/2))^order. Missing
+/// off at 3.5 of their median so that transients and spikes do not count; at 10 where what is beyond 3.5 comes all over the record, as in noise with heavy tails. A slowly varying signal is suppressed by (2 sin(omega dt/2))^order. Missing
 /// samples are left out. A channel that is quantised more coarsely than its noise returns `rounding_level`.
 double noise_level(const Eigen::VectorXd& channel, int order = 6);
 

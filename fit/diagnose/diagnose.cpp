@@ -8,6 +8,7 @@
 #include <iterator>
 #include <memory>
 #include <set>
+#include <utility>
 
 #include <fmt/format.h>
 
@@ -53,10 +54,6 @@ PlainFit plain_fit(const FitProblem& problem, const Arrival& baseline, bool thor
   plain.baseline_was_lost = after < hardly_less * before;
   if (after < before) plain.arrival = std::move(anew);
   return plain;
-}
-
-bool has_colour(const JointProblem& joint) {
-  return std::any_of(joint.runs().begin(), joint.runs().end(), [](const RunResidual& run) { return run.colour(0) != nullptr; });
 }
 
 /// With noise and motions looked at again, where that is worth it and does not take too long; otherwise as the search left it.
@@ -270,6 +267,8 @@ class DescriptionBeside {
     if (there && there->left > explained) there.reset();
     return looked_at_.emplace_back(set.effects, std::move(there)).second;
   }
+  /// What was seen in another noise.
+  void forget() { looked_at_.clear(); }
 
  private:
   const DiagnoseProblem& problem_;
@@ -321,11 +320,19 @@ Diagnosis diagnose_in_order(const DiagnoseProblem& problem, bool numbers_known) 
     limits.spend([&] { coloured = !effects_beat_noise(problem, fit_problem, baseline, in_colour); });
   }
   if (coloured) baseline = std::move(in_colour);
-  if (coloured) d.mismatch = locate_mismatch(baseline.arrival.joint);
+  if (coloured || (d.mismatch.found && in_noise_of_most(baseline))) d.mismatch = locate_mismatch(baseline.arrival.joint);
   std::optional<RigDescription> description;
   // What is far from explained by a step in the rig's numbers is asked about last.
   const double above_noise = std::max(nearly_explained, baseline.reduced_chi2()) - 1, far_away = 1 - (nearly_explained - 1) / above_noise;
   if (d.mismatch.found && !numbers_known) limits.spend([&] { description = describe_rig(problem, baseline, std::max(half_of_it, far_away)); });
+  // Numbers that were asked for in noise of a colour: that is the baseline's from then on.
+  const auto take_noise_of_description = [&] {
+    if (!description || !description->from) return false;
+    baseline = *std::exchange(description->from, std::nullopt);
+    d.mismatch = locate_mismatch(baseline.arrival.joint);
+    return true;
+  };
+  coloured |= take_noise_of_description();
   const bool described_already = description && description->left < explained;
   // What a set leaves may be noise that is not white, in which all is to be held against each other anew, or the rig's description.
   const Setting files{&fit_problem, &problem.heldout};
@@ -335,17 +342,26 @@ Diagnosis diagnose_in_order(const DiagnoseProblem& problem, bool numbers_known) 
   std::optional<FoundSet> beside;  // the rig's description and laws
   std::optional<Trial> begun;      // where the search among all effects goes on from
   DescriptionBeside described_beside(problem);
+  const auto begin_anew = [&](Trial in_its_noise) {
+    Trial same = baseline;
+    take_noise_of(same, in_its_noise);
+    baseline = std::move(same);
+    begun = std::move(in_its_noise);
+    described_beside.forget();
+    coloured = anew = true;
+  };
   const auto noise_or_rig = [&](const Trial& set) {
     if (Trial there = set; !coloured && explained_by_noise(there)) {
-      Trial in_its_noise = baseline;
-      take_noise_of(in_its_noise, there);
-      baseline = std::move(in_its_noise);
-      begun = std::move(there);
-      return coloured = anew = true;
+      begin_anew(std::move(there));
+      return true;
     }
     if (asked || described_already) return false;
     std::optional<RigDescription> rig = described_beside.explains(set);
     if (!rig) return false;
+    if (rig->from) {
+      begin_anew(std::move(*rig->from));
+      return true;
+    }
     asked = true;
     FoundSet with = laws_beside(*rig, problem, files, baseline, *selection);
     if (!with.explains()) return false;
@@ -397,6 +413,10 @@ Diagnosis diagnose_in_order(const DiagnoseProblem& problem, bool numbers_known) 
   if (!problem.verdict_only) d.maps = residual_maps(baseline.arrival.joint, d.mismatch.runs);
   if (!laws) found = look_at(problem, files, baseline, files, std::move(best_set), 0);
   if (d.mismatch.found && !numbers_known && !description && !found.explains()) limits.spend([&] { description = describe_rig(problem, baseline); });
+  if (take_noise_of_description()) {
+    selection = std::make_unique<Selection>(problem, fit_problem, baseline);
+    found = look_at(problem, files, baseline, files, baseline, 0);
+  }
   const bool described = description && weigh(problem, files, baseline, *description, std::move(beside), *selection, limits, found);
   if (described && laws) {
     laws.reset();

@@ -129,11 +129,14 @@ Mismatch locate_mismatch(const JointProblem& joint) {
       VectorXd left = standardised_residual(run, joint.theta(r), p, c);
       // In units of its own white part, where that can be told: the assumed level may be off by a few per cent.
       const double count = static_cast<double>((left.array() != 0).count());
+      const bool is_coarse = run.converter(c).step > 0;
+      if (is_coarse) left = run.converter(c).beyond(left * run.sigma(c));
       ChannelMismatch m{run.run().file, p.channels[c]};
       m.energy = left.squaredNorm() / count;
       const double freedom = count - static_cast<double>(run.linear_unknowns());
       const double energy_p = upper_normal((left.squaredNorm() - freedom) / std::sqrt(2 * freedom) / beyond_motion - (beyond_motion - 1) * std::sqrt(freedom / 2));
-      const Line line = is_linear(run, joint.theta(r)) ? strongest_line(left) : Line();  // a law is followed in steps, which leave lines of their own
+      // A law is followed in steps, which leave lines of their own; so does a coarse converter.
+      const Line line = is_linear(run, joint.theta(r)) && !is_coarse ? strongest_line(left) : Line();
       const double but_for_line = std::min(is_noise(run, left) ? 1.0 : energy_p, whiteness({left}));
       m.p_value = std::min(1.0, of_tests * std::min(but_for_line, line.p_value));
       m.excess = std::max(0.0, left.squaredNorm() - freedom);

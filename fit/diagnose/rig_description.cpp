@@ -3,12 +3,14 @@
 #include <algorithm>
 #include <cmath>
 #include <set>
+#include <stdexcept>
 #include <utility>
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
 #include "core/rig/default_errors.h"
+#include "fit/diagnose/selection.h"
 #include "fit/givens/inexact_rig.h"
 
 namespace unrig {
@@ -61,6 +63,23 @@ double load_of(const FitProblem& problem, const FitResult& fit, const Run& run) 
   return 0;
 }
 
+/// In coloured noise most of what white noise does not explain is no mismatch: where noise explains what the promised step leaves, the numbers are asked for in that noise.
+std::optional<RigDescription> in_the_noise_behind_a_step(const DiagnoseProblem& problem, const Trial& from, InexactRig& inexact, const Arrival& arrival) {
+  Trial stepped = from;
+  try {
+    stepped.arrival = inexact.after_the_promised_step(arrival);
+  } catch (const std::invalid_argument&) {  // no rig has such numbers
+    return {};
+  }
+  measure(stepped);
+  if (!explained_by_noise(stepped)) return {};
+  Trial in_its_noise = from;
+  take_noise_of(in_its_noise, stepped);
+  std::optional<RigDescription> description = describe_rig(problem, in_its_noise);
+  if (description) description->from = std::move(in_its_noise);
+  return description;
+}
+
 }  // namespace
 
 MissingEffect RigDescription::as_missing() const {
@@ -101,6 +120,7 @@ std::optional<RigDescription> describe_rig(const DiagnoseProblem& problem, const
   if (problem.progress) problem.progress("looking at the rig's description");
   FitProblem usual = with_usual_errors(problem);
   usual.effects = from.effects;
+  usual.rig.laws = from.arrival.model->rig().laws;
   InexactRig inexact(usual);
   Arrival arrival = from.arrival;
   double freedom = 0;
@@ -108,8 +128,10 @@ std::optional<RigDescription> describe_rig(const DiagnoseProblem& problem, const
     run.temper(1);
     freedom += static_cast<double>(run.degrees_of_freedom());
   }
-  const double promised = inexact.promises(arrival) / (arrival.joint.chi2() - freedom);
-  if (!(promised > least)) return {};
+  const double gain = inexact.promises(arrival), promised = gain / (arrival.joint.chi2() - freedom);
+  // Near the noise the excess is uncertain by chance as much.
+  const bool leaves_nothing = from.effects.empty() && gain > decisive && arrival.joint.chi2() - gain < explained * freedom;
+  if (!(promised > least) && !leaves_nothing) return gain > decisive && !has_colour(arrival.joint) ? in_the_noise_behind_a_step(problem, from, inexact, arrival) : std::nullopt;
 
   constexpr double worth_a_step = 0.01;  // of what is left: numbers that explain it are found in steps that promise far more
   inexact.search(arrival, worth_a_step);
@@ -119,7 +141,7 @@ std::optional<RigDescription> describe_rig(const DiagnoseProblem& problem, const
   moved->circulation = usual.circulation;
   moved->rig.givens = nullptr;
   for (Run& run : moved->runs) run.givens = nullptr;
-  RigDescription description{moved, moved_heldout(problem, usual, inexact.deviations()), fit_baseline(*moved), promised, arrival.joint.chi2() / freedom, inexact.cost_of_deviations(arrival), inexact.numbers()};
+  RigDescription description{moved, moved_heldout(problem, usual, inexact.deviations()), fit_baseline(*moved), promised, arrival.joint.chi2() / freedom, inexact.cost_of_deviations(arrival), inexact.numbers(), {}};
   take_noise_of(description.trial, from);
   const Eigen::MatrixXd& spread = inexact.stated_numbers().spread();
   const Eigen::MatrixXd covariance = spread * inexact.uncertainty(arrival).of_deviations * spread.transpose();

@@ -18,6 +18,7 @@ struct RigDescription {
   double left = 0;                            ///< reduced chi-square of the fit that the numbers were found with, laws included
   double cost = 0;                            ///< z^T z + ln det(I + K), to be added to a difference of BIC
   std::vector<FittedGiven> numbers;           ///< all of them, with their errors
+  std::optional<Trial> from;                  ///< what it was asked of, in the noise that it left, where that has a colour
 
   /// As something missing. Its parameters are the numbers that moved most in units of the usual error, those by one standard deviation or more: five at most, one at least; `start` is what the file says.
   MissingEffect as_missing() const;
@@ -28,7 +29,7 @@ struct RigDescription {
 ///   least of chi-square(theta, z) + z^T z,   twice the logarithm of the evidence = -(difference of BIC + z^T z + ln det(I + K)),
 ///
 /// z independent standard normal deviations of the numbers, K what the runs say of z with theta eliminated (fit/givens/inexact_rig.h). None where one linear step promises less than the share
-/// `least` of the excess of chi-square.
+/// `least` of the excess of chi-square and, of a fit without effects, to leave something, and where noise of a colour does not explain what the step leaves; if it does, all is asked in that noise.
 std::optional<RigDescription> describe_rig(const DiagnoseProblem& problem, const Trial& from, double least = 0.5);
 
 /// By how many per cent the loads at the ends of the steps change from one fit to another, on the mean; 0 where no run is a step. Load: s rho U^2 b L of a strip (core/model/strip_theory.h).

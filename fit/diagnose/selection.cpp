@@ -138,6 +138,15 @@ bool explained_by_noise(Trial& trial) {
   return true;
 }
 
+bool in_noise_of_most(Trial& trial) {
+  for (std::size_t r = 0; r < trial.variance.size(); ++r)
+    if (!trial.arrival.joint.runs()[r].is_aside() && trial.variance[r] < explained) return false;
+  Trial coloured = trial;
+  if (!take_noise_colour_of_most(coloured) || 2 * locate_mismatch(coloured.arrival.joint).runs.size() > trial.variance.size()) return false;
+  trial = std::move(coloured);
+  return true;
+}
+
 Selection::Selection(const DiagnoseProblem& problem, const FitProblem& fit_problem, const Trial& baseline) : problem_(problem), fit_problem_(fit_problem), baseline_(baseline) {
   ranking_.push_back({{}, baseline.reduced_chi2(), 0, 0, 0});
 }

@@ -16,6 +16,9 @@ Mismatch what_remains(const Trial& trial);
 /// Whether noise of a colour, at rest, explains all that a fit leaves; if so, the fit is in that noise from then on.
 bool explained_by_noise(Trial& trial);
 
+/// Whether white noise explains none of the runs and noise of a colour, found at rest, at least half of them: the gauge's, beside which something remains in the others. If so, the fit is in that noise from then on.
+bool in_noise_of_most(Trial& trial);
+
 /// Whether two sets have the same effects, in whichever order.
 bool same_set(std::vector<std::string> a, std::vector<std::string> b);
 

@@ -82,6 +82,12 @@ double InexactRig::promises(const Arrival& arrival) {
   return length * length;
 }
 
+Arrival InexactRig::after_the_promised_step(const Arrival& arrival) {
+  Candidate next = moved(arrival, next_step(arrival), 1);
+  one_step_ = std::move(next.problem);
+  return std::move(next.arrival);
+}
+
 double InexactRig::cost_of_deviations(const Arrival& arrival) const {
   const JointInformation information = joint_information(arrival.joint, *slopes_);
   const auto count = static_cast<Index>(information.free.size()), deviations = z_.size();

@@ -24,6 +24,8 @@ class InexactRig {
 
   /// How far chi-square + z^T z would fall by one step in parameters and deviations from a fit at the present numbers, were both linear.
   double promises(const Arrival& arrival);
+  /// The fit at the numbers that this step leads to, theta at its best there. This object stays where it is; it keeps the runs.
+  Arrival after_the_promised_step(const Arrival& arrival);
   /// From a fit at the present numbers (at first the stated ones) to the best of both. The runs of `arrival` are this object's from then on. It ends, too, where a step promises
   /// less than `worth` of what is left above the noise.
   void search(Arrival& arrival, double worth = 0);
@@ -61,6 +63,7 @@ class InexactRig {
   StatedNumbers numbers_;
   Eigen::VectorXd z_;
   std::shared_ptr<const FitProblem> problem_;  ///< at z_; none while they are the stated ones
+  std::shared_ptr<const FitProblem> one_step_;  ///< behind after_the_promised_step
   std::optional<NumberSlopes> slopes_;
 };
 

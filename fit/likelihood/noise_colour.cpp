@@ -137,12 +137,9 @@ double once_in_a_thousand(double n) {
   return n * std::pow(1 - spread + normal * std::sqrt(spread), 3);
 }
 
-/// Whether lines in units of their spectrum are those of white noise: Bartlett's test of the cumulative periodogram for what is broad, and that of the largest line for what is narrow (R. A. Fisher,
-/// Proc. R. Soc. A 125 (1929) 54), each failed once in a thousand.
-bool is_white(const VectorXd& relative) {
-  constexpr double once = 1e-3;
-  if (relative.maxCoeff() / relative.mean() > std::log(static_cast<double>(relative.size()) / once)) return false;
-  constexpr double once_in_a_thousand_of_kolmogorov = 1.9495;
+/// How far lines in units of their spectrum are from those of white noise, 1 where one of two tests fails as it does with the probability `chance`: Bartlett's of the cumulative periodogram for what is broad, by the
+/// first term of Kolmogorov's distribution, and that of the largest line for what is narrow (R. A. Fisher, Proc. R. Soc. A 125 (1929) 54).
+double far_from_white(const VectorXd& relative, double chance) {
   const auto count = static_cast<double>(relative.size());
   const double total = relative.sum();
   double sum = 0, distance = 0;
@@ -150,7 +147,7 @@ bool is_white(const VectorXd& relative) {
     sum += relative[k];
     distance = std::max(distance, std::abs(sum / total - static_cast<double>(k + 1) / count));
   }
-  return std::sqrt(count) * distance < once_in_a_thousand_of_kolmogorov;
+  return std::max(relative.maxCoeff() / relative.mean() / std::log(count / chance), std::sqrt(count) * distance / std::sqrt(std::log(2 / chance) / 2));
 }
 
 }  // namespace
@@ -162,10 +159,6 @@ double NoiseColour::density(double frequency, double dt) const {
 }
 
 namespace {
-
-bool leaves_white(const std::vector<Stretch>& stretches, const VectorXd& powers) {
-  return std::all_of(stretches.begin(), stretches.end(), [&](const Stretch& s) { return is_white(s.power.cwiseQuotient(s.basis * powers)); });
-}
 
 /// All parts, none smaller than a spectrum of a hundredth of the white one's: what a few lines said no of may be asked again.
 NoiseColour colour_from(const VectorXd& corner, const VectorXd& powers, double dt) {
@@ -181,6 +174,13 @@ struct Longest {
   double duration = 0, dt = 0;
 };
 
+/// Of the greatest likelihood, where that has a colour.
+struct CommonColour {
+  NoiseColour colour;
+  double farthest = 0;    // from white, of what it leaves of the residuals
+  std::size_t which = 0;  // of them that is
+};
+
 Longest longest_stretch(const std::vector<RestResidual>& residuals) {
   Longest longest;
   for (const RestResidual& r : residuals)
@@ -189,27 +189,49 @@ Longest longest_stretch(const std::vector<RestResidual>& residuals) {
   return longest;
 }
 
-}  // namespace
-
-std::optional<NoiseColour> colour_of(const std::vector<RestResidual>& residuals) {
+std::optional<CommonColour> colour_in_common(const std::vector<RestResidual>& residuals) {
   const Longest longest = longest_stretch(residuals);
   if (!(longest.duration > 0)) return std::nullopt;
   const VectorXd corner = corners_for(1 / longest.dt, longest.duration);
   std::vector<Stretch> stretches;
+  std::vector<std::size_t> owner;
   double of_white = 0;
-  for (const RestResidual& r : residuals) {
-    std::vector<Stretch> own = periodograms(r, corner);
+  for (std::size_t i = 0; i < residuals.size(); ++i) {
+    std::vector<Stretch> own = periodograms(residuals[i], corner);
     if (own.empty()) continue;
     const Groups groups(own);
     if (!(groups.white()[0] > 0)) return std::nullopt;
     of_white += groups.log_likelihood(groups.white());
+    owner.insert(owner.end(), own.size(), i);
     std::move(own.begin(), own.end(), std::back_inserter(stretches));
   }
   const Groups lines(stretches);
   const VectorXd powers = most_likely_powers(lines);
   const double gained = 2 * (lines.log_likelihood(lines.basis * powers) - of_white);
-  if (gained < once_in_a_thousand(static_cast<double>(corner.size())) || !leaves_white(stretches, powers)) return std::nullopt;
-  return colour_from(corner, powers, longest.dt);
+  if (gained < once_in_a_thousand(static_cast<double>(corner.size()))) return std::nullopt;
+  CommonColour common{colour_from(corner, powers, longest.dt)};
+  const double chance = 1e-3 / (2 * static_cast<double>(stretches.size()));  // Bonferroni: of two tests each
+  for (std::size_t i = 0; i < stretches.size(); ++i)
+    if (const double far = far_from_white(stretches[i].power.cwiseQuotient(stretches[i].basis * powers), chance); far > common.farthest) common.farthest = far, common.which = owner[i];
+  return common;
+}
+
+}  // namespace
+
+std::optional<NoiseColour> colour_of(const std::vector<RestResidual>& residuals) {
+  const std::optional<CommonColour> common = colour_in_common(residuals);
+  return common && common->farthest < 1 ? std::optional(common->colour) : std::nullopt;
+}
+
+std::optional<NoiseColour> colour_of_most(std::vector<RestResidual> residuals) {
+  const std::size_t half = (residuals.size() + 1) / 2;
+  for (;;) {
+    const std::optional<CommonColour> common = colour_in_common(residuals);
+    if (!common) return std::nullopt;
+    if (common->farthest < 1) return common->colour;
+    if (residuals.size() <= half) return std::nullopt;
+    residuals.erase(residuals.begin() + static_cast<std::ptrdiff_t>(common->which));
+  }
 }
 
 std::optional<NoiseColour> sized(const NoiseColour& colour, const RestResidual& residual) {

@@ -21,6 +21,8 @@ struct NoiseColour {
 
   /// Variance of the whole.
   double variance() const { return white + power.sum(); }
+  /// Of noise that is so many times as large.
+  NoiseColour times(double size) const { return {corner, size * size * power, size * size * white}; }
   /// Its one-sided spectrum, of samples `dt` [s] apart, at a frequency [Hz]; per Hz.
   double density(double frequency, double dt) const;
 };
@@ -40,8 +42,11 @@ struct RestResidual {
 ///
 /// Whittle's likelihood of the periodograms of stretches without left-out samples is greatest. The powers are found by the multiplicative steps of C. Fevotte, N. Bertin and J.-L. Durrieu,
 /// Neural Comput. 21 (2009) 793, for the distance of Itakura and Saito. Colour counts where twice the logarithm of its likelihood over white noise's has a probability below 1e-3 in white noise,
-/// and where what the colour leaves of each stretch is white (Bartlett's test, and Fisher's of the largest line, at the same level).
+/// and where what the colour leaves of each stretch is white (Bartlett's test, and Fisher's of the largest line, at the same level, corrected for their number).
 std::optional<NoiseColour> colour_of(const std::vector<RestResidual>& residuals);
+
+/// The colour that most residuals have in common, half of them at least: the one farthest from white behind it is left out, one at a time, until colour_of has an answer.
+std::optional<NoiseColour> colour_of_most(std::vector<RestResidual> residuals);
 
 /// `colour` in the size that is most likely for this residual; none where it is not a stretch long enough.
 std::optional<NoiseColour> sized(const NoiseColour& colour, const RestResidual& residual);

@@ -135,11 +135,14 @@ RunResidual::RunResidual(const AeroelasticModel& model, const Run& run, std::vec
   const auto judged = [counts = VectorXd(use)](const VectorXd& value) -> VectorXd { return (counts.array() > 0).select(value, std::nan("")); };  // for the noise
   use.tail(n - last_sample_).setZero();
 
+  converter_.resize(channels_.size());
   measured_.resize(n, static_cast<Index>(channels_.size()));
   weight_.resizeLike(measured_);
   for (std::size_t c = 0; c < channels_.size(); ++c) {
     const VectorXd& value = run.channel(channels_[c]).value;
     sigma_.push_back(noise_of(judged(value)));
+    converter_[c] = coarse_converter(value, sigma_[c]);
+    sigma_[c] = std::max(sigma_[c], converter_[c].usual_error());
     if (!(sigma_[c] > 0))
       throw InputError({run.file, run.header_line}, fmt::format("the column \"{}\" never changes", channels_[c]), "wanted a reading that answers to the rig",
                        "Look for a broken cable or a stopped converter.");
@@ -269,6 +272,7 @@ void RunResidual::set_motion_prior(const MatrixXd& rows) {
 
 void RunResidual::keep_noise_of(const RunResidual& other) {
   sigma_ = other.sigma_;
+  converter_ = other.converter_;
   weight_ = other.weight_;
   Linearised::keep_input_noise(*this, other);
   Linearised::keep_white(*this, other);
@@ -299,7 +303,7 @@ void RunResidual::settle_noise(const VectorXd& theta) {
   std::vector<bool> at_rest(static_cast<std::size_t>(run_->samples()), false);
   for (const MotionBasis::Phase& phase : phases_)
     if (!phase.moving) std::fill(at_rest.begin() + phase.samples.first, at_rest.begin() + phase.samples.last, true);
-  const auto settle = [&](const std::string& channel, VectorXd residual, Eigen::Ref<VectorXd> weight, double& sigma) {
+  const auto settle = [&](const std::string& channel, VectorXd residual, Eigen::Ref<VectorXd> weight, double& sigma, const CoarseConverter& converter) {
     const auto counts = [&](Index k) { return weight[k] > 0 && std::isfinite(residual[k]); };
     Index all = 0, resting = 0;
     for (Index k = 0; k < residual.size(); ++k)
@@ -313,17 +317,18 @@ void RunResidual::settle_noise(const VectorXd& theta) {
     const double taken = rests ? 1 : std::sqrt(static_cast<double>(all) / static_cast<double>(all - unknowns_));
     constexpr double chance = 0.06;  // two standard deviations between the two estimates for some thousand samples
     const double third = noise_level(residual, 3), first = noise_level(residual, 1);
-    const double level = std::max(taken * (first < (1 + chance) * third ? first : third), least_noise(run_->channel(channel).value));
-    if (!(level > 0) || level >= sigma) return;
+    double level = std::max(taken * (first < (1 + chance) * third ? first : third), least_noise(run_->channel(channel).value));
+    if (converter.step > 0) level = converter.error(residual);
+    if (!(level > 0) || (level >= sigma && converter.step == 0)) return;
     weight *= sigma / level;
     sigma = level;
   };
   for (std::size_t c = 0; c < channels_.size(); ++c) {
     const auto column = static_cast<Index>(c);
     if (colour(c)) continue;  // has its own level
-    settle(channels_[c], measured_.col(column) - p.output.col(column), weight_.col(column), sigma_[c]);
+    settle(channels_[c], measured_.col(column) - p.output.col(column), weight_.col(column), sigma_[c], converter_[c]);
   }
-  if (angle_offset_ >= 0) settle("alpha", angle_ - p.motion.angle - VectorXd::Constant(angle_.size(), p.angle_offset[0]), angle_weight_, angle_sigma_);
+  if (angle_offset_ >= 0) settle("alpha", angle_ - p.motion.angle - VectorXd::Constant(angle_.size(), p.angle_offset[0]), angle_weight_, angle_sigma_, {});
   if (p.output.allFinite() && filters_.empty()) Linearised::settle_input_noise(*this, theta, measured_ - p.output);
   weights_changed();
 }

@@ -13,6 +13,7 @@
 #include "core/run/motion.h"
 #include "core/propagate/response.h"
 #include "core/run/run.h"
+#include "fit/likelihood/coarse_converter.h"
 #include "fit/likelihood/noise_colour.h"
 #include "fit/likelihood/rest_rows.h"
 
@@ -140,6 +141,8 @@ class RunResidual {
   const MotionBasis& motion() const { return motion_; }
   const std::vector<std::string>& channels() const { return channels_; }
   double sigma(std::size_t channel) const { return sigma_[channel]; }
+  /// What reads a channel, where that is coarse beside its noise (settle_noise).
+  const CoarseConverter& converter(std::size_t channel) const { return converter_[channel]; }
   double angle_sigma() const { return angle_sigma_; }
   /// Samples with a weight, over all channels and the angle, minus linear unknowns.
   Eigen::Index degrees_of_freedom() const;
@@ -171,7 +174,7 @@ class RunResidual {
 
   /// Takes the noise of each channel from what the model at theta leaves of it, where that is less: differences of the raw channel keep some of
   /// a fast signal. Differences do not see a slow mismatch: of first order (the most
-  /// efficient), unless those of third order are smaller by more than chance.
+  /// efficient), unless those of third order are smaller by more than chance. A coarse converter's error is what it is at rest, half a step at most, and may be more than before.
   void settle_noise(const Eigen::VectorXd& theta);
 
   /// Whether a colour can be set: where nothing measured drives the model and it goes on from no other part.
@@ -308,6 +311,7 @@ class RunResidual {
   Eigen::MatrixXd measured_;  ///< samples x channels, missing samples 0
   Eigen::MatrixXd weight_;    ///< 1 / sigma, 0 where left out
   std::vector<double> sigma_;
+  std::vector<CoarseConverter> converter_;
   std::vector<std::optional<NoiseColour>> colour_;  ///< by channel; empty: all are white
   std::vector<WhiteningFilter> filters_;            ///< of the coloured channels, in turn
   Eigen::MatrixXd whitened_;                        ///< measured_ behind the filters, empty without

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 
 #include "core/effects/effect.h"
 #include "core/law/law_effect.h"
@@ -177,21 +178,45 @@ Trial fit_baseline(const FitProblem& problem) {
   return trial;
 }
 
-bool take_noise_colour(Trial& trial) {
-  JointProblem& joint = trial.arrival.joint;
-  const std::vector<ChannelColour> in_common = noise_colours(joint);
+namespace {
+
+/// `colours_for`: those of each run that may have some.
+bool take_colours(Trial& trial, const std::vector<ChannelColour>& in_common, const std::function<RunResidual::Colours(const RunResidual&, const Eigen::VectorXd&)>& colours_for) {
   if (in_common.empty()) return false;
+  JointProblem& joint = trial.arrival.joint;
   for (std::size_t r = 0; r < joint.runs().size(); ++r) {
     RunResidual& run = joint.runs()[r];
-    if (run.may_be_coloured() && !run.is_aside()) run.set_colours(joint.theta(r), run.colours(joint.theta(r), in_common));
+    if (run.may_be_coloured() && !run.is_aside() && run.converter(0).step == 0) run.set_colours(joint.theta(r), colours_for(run, joint.theta(r)));
   }
   fit_fully(trial, 2);
   return true;
 }
 
+}  // namespace
+
+bool take_noise_colour(Trial& trial) {
+  const std::vector<ChannelColour> in_common = noise_colours(trial.arrival.joint);
+  return take_colours(trial, in_common, [&](const RunResidual& run, const Eigen::VectorXd& theta) { return run.colours(theta, in_common); });
+}
+
+bool take_noise_colour_of_most(Trial& trial) {
+  const std::vector<ChannelColour> in_common = noise_colours_of_most(trial.arrival.joint);
+  return take_colours(trial, in_common, [&](const RunResidual& run, const Eigen::VectorXd&) {
+    RunResidual::Colours colours(run.channels().size());
+    for (std::size_t c = 0; c < colours.size(); ++c)
+      for (const ChannelColour& known : in_common)
+        if (known.channel == run.channels()[c]) colours[c] = known.colour.times(run.noise(c));
+    return colours;
+  });
+}
+
+bool has_colour(const JointProblem& joint) {
+  return std::any_of(joint.runs().begin(), joint.runs().end(), [](const RunResidual& run) { return run.colour(0) != nullptr; });
+}
+
 void take_noise_of(Trial& trial, const Trial& other) {
+  if (!has_colour(other.arrival.joint)) return;
   const std::vector<RunResidual>& known = other.arrival.joint.runs();
-  if (std::none_of(known.begin(), known.end(), [](const RunResidual& run) { return run.colour(0) != nullptr; })) return;
   JointProblem& joint = trial.arrival.joint;
   for (std::size_t r = 0; r < joint.runs().size(); ++r) joint.runs()[r].keep_noise_of(known[r]);
   fit_fully(trial, 5);

@@ -173,6 +173,24 @@ TEST(NoiseLevel, WithstandsSpikesAndSteps) {
   EXPECT_LT(level, 1.1 + four_deviations(length));
 }
 
+TEST(NoiseLevel, CountsTailsThatComeAllOverTheRecord) {
+  std::mt19937_64 random(15);
+  std::student_t_distribution<double> student(3);
+  VectorXd x(length);
+  for (double& value : x)
+    do value = sigma * student(random);
+    while (std::abs(value) > 10 * sigma);  // what is further out is no reading (core/run/bad_readings.h)
+  const double spread = x.norm() / std::sqrt(static_cast<double>(length));
+  // A third above the scale of the middle, which a cut at 3.5 would tell. Of the tails the cut at 10 of the differences takes some per cent.
+  for (const int order : {1, 3, 6}) EXPECT_NEAR(noise_level(x, order) / spread, 1, 0.08) << order;
+}
+
+TEST(NoiseLevel, DoesNotCountATransient) {
+  VectorXd x = white_noise(length, sigma, 16);
+  for (Index k = 0; k < 60; ++k) x[k] += 5 * sigma * (k % 2 == 0 ? 1 : -1);
+  EXPECT_NEAR(noise_level(x) / sigma, 1, 0.01 + four_deviations(length));
+}
+
 TEST(NoiseLevel, OfACoarseConverterIsItsQuantum) {
   const double quantum = 0.25;
   VectorXd x(length);

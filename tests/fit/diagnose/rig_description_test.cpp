@@ -5,6 +5,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
+#include <random>
 
 #include <nlohmann/json.hpp>
 
@@ -58,6 +60,31 @@ TEST(RigDescription, PutsAWrongChordRight) {
     EXPECT_TRUE(std::isfinite(g.std_error)) << g.name;
     EXPECT_LE(g.std_error, 1.1 * g.stated_std) << g.name;
   }
+}
+
+/// Most of what white noise does not explain is no mismatch then, and no number of the rig takes it.
+TEST(RigDescription, IsFoundInNoiseOfAColour) {
+  DiagnoseProblem problem = campaign("null");
+  problem.rig.normal.inertia[12] *= 1.05;
+  constexpr double corner = 5, sigma = 0.03;  // Hz, N
+  std::mt19937_64 random(1);
+  std::normal_distribution<double> normal;
+  for (unrig::Run& run : problem.runs) {
+    Eigen::VectorXd& gauge = std::find_if(run.channels.begin(), run.channels.end(), [](const Channel& c) { return c.name == "gauge"; })->value;
+    const double pole = std::exp(-2 * std::numbers::pi * corner * run.dt);
+    double noise = sigma * normal(random);
+    for (double& reading : gauge) reading += noise, noise = pole * noise + std::sqrt(1 - pole * pole) * sigma * normal(random);
+  }
+  const FitProblem fit = fit_of(problem);
+  const Trial baseline = baseline_of(fit);
+  Trial in_colour = baseline;
+  ASSERT_FALSE(explained_by_noise(in_colour));
+  const std::optional<RigDescription> description = describe_rig(problem, baseline);
+  ASSERT_TRUE(description);
+  ASSERT_TRUE(description->from);
+  EXPECT_TRUE(has_colour(description->from->arrival.joint));
+  EXPECT_FALSE(what_remains(description->trial).found);
+  EXPECT_LT(bic_difference(description->trial, *description->from) + description->cost, -decisive);
 }
 
 TEST(RigDescription, DoesNotExplainAFilterInTheGauge) {
