@@ -333,7 +333,7 @@ Diagnosis diagnose_in_order(const DiagnoseProblem& problem, bool numbers_known) 
     return true;
   };
   coloured |= take_noise_of_description();
-  const bool described_already = description && description->left < explained;
+  const bool described_already = description && description->left < explained && !what_remains(description->trial).found;
   // What a set leaves may be noise that is not white, in which all is to be held against each other anew, or the rig's description.
   const Setting files{&fit_problem, &problem.heldout};
   auto selection = std::make_unique<Selection>(problem, fit_problem, baseline);
