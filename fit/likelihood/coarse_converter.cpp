@@ -25,7 +25,7 @@ double CoarseConverter::error(const VectorXd& residual) const {
 }
 
 VectorXd CoarseConverter::beyond(const VectorXd& residual) const {
-  constexpr double of_noise = 0.1210;  // steps: root mean square of max(0, |r| - 1/2), r normal of variance 1/3.5^2 + 1/12
+  constexpr double of_noise = 0.1472;  // steps: root mean square of max(0, |r| - 1/2), r normal of variance 1/9 + 1/12
   return residual.unaryExpr([this](double r) { return std::copysign(std::max(0.0, std::abs(r) - step / 2), r) / (of_noise * step); });
 }
 

@@ -12,7 +12,8 @@ struct CoarseConverter {
   double usual_error() const;
   /// Root mean square of a residual [the same], none counted with more than half a step; 0 where the converter is fine. Samples that are not finite do not count.
   double error(const Eigen::VectorXd& residual) const;
-  /// What of a residual [the same] is further out than half a step, max(0, |r| - step/2), over what the most noise leaves there. Of a coarse converter's errors the mean square is 1 at most.
+  /// What of a residual [the same] is further out than half a step, max(0, |r| - step/2), over what noise of a third of a step leaves there, more than it has: how coarse a converter is
+  /// a record tells to a tenth. Of its errors the mean square is 1 at most.
   Eigen::VectorXd beyond(const Eigen::VectorXd& residual) const;
 };
 
