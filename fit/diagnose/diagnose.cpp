@@ -314,13 +314,14 @@ Diagnosis diagnose_in_order(const DiagnoseProblem& problem, bool numbers_known) 
   Diagnosis d;
   d.mismatch = locate_mismatch(baseline.arrival.joint);
   Trial in_colour = baseline;
-  bool coloured = d.mismatch.found && explained_by_noise(in_colour);
+  const bool noise_explains = d.mismatch.found && explained_by_noise(in_colour);
+  bool coloured = noise_explains;
   if (coloured) {
     tell("noise of a colour explains what is left; asking whether effects explain it better");
     limits.spend([&] { coloured = !effects_beat_noise(problem, fit_problem, baseline, in_colour); });
   }
   if (coloured) baseline = std::move(in_colour);
-  if (coloured || (d.mismatch.found && in_noise_of_most(baseline))) d.mismatch = locate_mismatch(baseline.arrival.joint);
+  if (coloured || (d.mismatch.found && !noise_explains && in_noise_of_most(baseline))) d.mismatch = locate_mismatch(baseline.arrival.joint);
   std::optional<RigDescription> description;
   // What is far from explained by a step in the rig's numbers is asked about last.
   const double above_noise = std::max(nearly_explained, baseline.reduced_chi2()) - 1, far_away = 1 - (nearly_explained - 1) / above_noise;
