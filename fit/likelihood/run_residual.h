@@ -141,7 +141,7 @@ class RunResidual {
   const MotionBasis& motion() const { return motion_; }
   const std::vector<std::string>& channels() const { return channels_; }
   double sigma(std::size_t channel) const { return sigma_[channel]; }
-  /// What reads a channel, where that is coarse beside its noise (settle_noise).
+  /// What reads a channel, where that is coarse beside its noise.
   const CoarseConverter& converter(std::size_t channel) const { return converter_[channel]; }
   double angle_sigma() const { return angle_sigma_; }
   /// Samples with a weight, over all channels and the angle, minus linear unknowns.

@@ -181,8 +181,8 @@ TEST(NoiseLevel, CountsTailsThatComeAllOverTheRecord) {
     do value = sigma * student(random);
     while (std::abs(value) > 10 * sigma);  // what is further out is no reading (core/run/bad_readings.h)
   const double spread = x.norm() / std::sqrt(static_cast<double>(length));
-  // A third above the scale of the middle, which a cut at 3.5 would tell. Of the tails the cut at 10 of the differences takes some per cent.
-  for (const int order : {1, 3, 6}) EXPECT_NEAR(noise_level(x, order) / spread, 1, 0.08) << order;
+  // A cut at 3.5 makes the levels 8, 6 and 3 % too small, measured; of the differences' own scatter (four_deviations, which is of order 6) 1.4 % were seen.
+  for (const int order : {1, 3, 6}) EXPECT_NEAR(noise_level(x, order) / spread, 1, 0.02) << order;
 }
 
 TEST(NoiseLevel, DoesNotCountATransient) {

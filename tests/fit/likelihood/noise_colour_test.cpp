@@ -144,6 +144,24 @@ TEST(NoiseColour, IsNotALineNorARinging) {
   }
 }
 
+/// A mismatch in one run or two of five hides the colour of all, but not that of most.
+TEST(NoiseColour, OfMostIsToldBesideAMismatchInOthers) {
+  const NoiseColour truth{VectorXd{{5}}, VectorXd{{0.6}}, 0.4};
+  for (const unsigned mismatches : {0u, 1u, 2u, 3u}) {
+    std::vector<RestResidual> runs;
+    for (unsigned r = 0; r < 5; ++r) {
+      VectorXd left = noise_of(truth, 3000, 20 + r);
+      for (Index k = 0; r < mismatches && k < left.size(); ++k) left[k] += 3 * std::sin(2 * std::numbers::pi * (7 + r) * dt * static_cast<double>(k));
+      runs.push_back({left, dt});
+    }
+    const std::optional<NoiseColour> of_most = colour_of_most(runs);
+    EXPECT_EQ(colour_of(runs).has_value(), mismatches == 0) << mismatches;
+    EXPECT_EQ(of_most.has_value(), mismatches <= 2) << mismatches;
+    if (!of_most) continue;
+    EXPECT_NEAR(of_most->variance(), truth.variance(), 0.15 * truth.variance()) << "three runs of 6 s of a corner at 5 Hz tell it to 6 %";
+  }
+}
+
 TEST(NoiseColour, OfOthersTakesTheSizeThatIsHere) {
   NoiseColour truth = three_parts();
   const std::optional<NoiseColour> here = sized(truth, {3 * noise_of(truth, 20000, 7), dt});
