@@ -402,7 +402,7 @@ Diagnosis diagnose_in_order(const DiagnoseProblem& problem, bool numbers_known) 
   if (!laws) fit_problem.rig.laws.clear();
   // Laws of the list that take most of the mismatch are where the search among all effects goes on from.
   const auto is_begun = [&](const Trial& t) { return std::none_of(t.effects.begin(), t.effects.end(), is_law_id) && t.excess() < half_of_it * baseline.excess() && bic_difference(t, baseline) < -decisive; };
-  if (const auto first = std::find_if(laws_tried.begin(), laws_tried.end(), is_begun); first != laws_tried.end()) begun = *first;
+  if (const auto first = std::find_if(laws_tried.begin(), laws_tried.end(), is_begun); first != laws_tried.end()) best_set = *first, begun = *first;
   if (!laws) limits.spend([&] { best_set = selection->best_set(noise_or_rig, begun ? &*begun : nullptr); });
   if (anew) {
     tell("trying what may be missing, in noise of the colour that is left");

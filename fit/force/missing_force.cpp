@@ -5,6 +5,7 @@
 
 #include "core/propagate/exact_step.h"
 #include "core/numerics/in_parallel.h"
+#include "core/numerics/work.h"
 
 namespace unrig {
 namespace {
@@ -145,6 +146,7 @@ MatrixXd ForceFilter::innovations_of_forces(const MatrixXd& forces, const Vector
     if (k + 1 < samples) next.leftCols(known).noalias() += input1_ * per_sample.col(k + 1).transpose();
     state.swap(next);
   }
+  count_work(samples * n * (n + 3) * (known + n));
   return out.transpose();
 }
 

@@ -15,7 +15,7 @@ using Eigen::RowVectorXd;
 using Eigen::VectorXd;
 
 /// What a parameter is counted in.
-enum class In { number, force, moment, x, v, twist, twist_rate, seconds, force_per_x };
+enum class In { number, force, moment, x, v, twist, twist_rate, seconds, force_per_x, moment_per_twist };
 
 struct FormParameter {
   const char* name;
@@ -33,6 +33,7 @@ struct Line {
   std::vector<FormParameter> parameters;
   std::vector<Symbol> scaled;
   const char* listed = "";
+  int power = 0;  // of its symbol's scale, per which that effect counts its first parameter
 };
 
 constexpr double little = 0.02, more = 0.1;  // of the force that the runs reach: starts, between which a search finds its way
@@ -76,6 +77,20 @@ std::vector<Line> lines() {
   return all;
 }
 
+/// Laws of the list as formulas, beside those of the lines above that are on it.
+std::vector<Line> listed_lines() {
+  using enum Symbol;
+  const FormParameter either{"c", In::force, {little, -little}};
+  std::vector<Line> all{
+      {"cubic stiffness", ActsOn::normal, "-c * x^3", "", {either}, {x}, "cubic-stiffness", 3},
+      {"cubic damping", ActsOn::normal, "-c * v^3", "", {{"c", In::force, {little}, 0}}, {v}, "cubic-damping", 3},
+      {"gap in the torsional drive", ActsOn::torsion, "k * max(-s, min(s, twist))", "", {{"s", In::twist, {0.1}, 0, 1}, {"k", In::moment_per_twist, {more}, 0}}, {}, "freeplay"},
+  };
+  for (Line& line : lines())
+    if (*line.listed != 0) all.push_back(std::move(line));
+  return all;
+}
+
 struct Count {
   double size;
   const char* unit;
@@ -92,6 +107,7 @@ Count one_of(In in, const Reach& r) {
     case In::twist_rate: return {r.twist_rate, "rad/s"};
     case In::seconds: return {r.seconds, "s"};
     case In::force_per_x: return {r.force / r.x, "N/m"};
+    case In::moment_per_twist: return {r.moment / r.twist, "N.m/rad"};
     case In::number: break;
   }
   return {1, "1"};
@@ -144,12 +160,14 @@ Form put(const Line& line, const Reach& r) {
     starts = std::move(each);
   }
   form.law = parse_law(law_text(law), "the dictionary of laws");
+  if (line.power != 0) form.per_coefficient = std::pow(form.law.scales[static_cast<std::size_t>(line.scaled.front())], -line.power);
+  for (const FormParameter& p : line.parameters)
+    for (std::size_t i = 0; i < form.law.parameters.size(); ++i)
+      if (form.law.parameters[i].name == p.name) form.listed_order.push_back(static_cast<Eigen::Index>(i));
   // The reader has sorted parameters as the formulas name them.
   for (const VectorXd& values : starts) {
     VectorXd sorted(values.size());
-    for (std::size_t i = 0; i < form.law.parameters.size(); ++i)
-      for (std::size_t k = 0; k < line.parameters.size(); ++k)
-        if (form.law.parameters[i].name == line.parameters[k].name) sorted[static_cast<Eigen::Index>(i)] = values[static_cast<Eigen::Index>(k)];
+    for (std::size_t k = 0; k < line.parameters.size(); ++k) sorted[form.listed_order[k]] = values[static_cast<Eigen::Index>(k)];
     form.starts.push_back(std::move(sorted));
   }
   return form;
@@ -201,13 +219,29 @@ Reach reach_of(const BesideUnknownForces& beside) {
   return reach;
 }
 
-std::vector<Form> dictionary(const Rig& rig, const Reach& reach) {
+namespace {
+
+std::vector<Form> put_all(const std::vector<Line>& lines, const Rig& rig, const Reach& reach) {
   std::vector<Form> forms;
-  for (const Line& line : lines()) {
+  for (const Line& line : lines) {
     const bool needs_section = line.acts_on == ActsOn::lift || line.acts_on == ActsOn::torsion || std::string_view(line.force).find("theta") != std::string_view::npos;
     if (moved(line, reach) && !(needs_section && rig.is_modal())) forms.push_back(put(line, reach));
   }
   return forms;
+}
+
+}  // namespace
+
+std::vector<Form> dictionary(const Rig& rig, const Reach& reach) { return put_all(lines(), rig, reach); }
+
+std::vector<Form> laws_of_the_list(const Rig& rig, const Reach& reach) { return put_all(listed_lines(), rig, reach); }
+
+VectorXd as_listed(const Form& form, const VectorXd& own) {
+  const std::vector<Parameter>& parameters = effect(form.listed).parameters;
+  VectorXd values(static_cast<Eigen::Index>(parameters.size()));
+  for (std::size_t k = 0; k < parameters.size(); ++k) values[static_cast<Eigen::Index>(k)] = k < form.listed_order.size() ? own[form.listed_order[k]] : parameters[k].start;
+  values[0] *= form.per_coefficient;
+  return values;
 }
 
 std::vector<std::string> listed_forms() {

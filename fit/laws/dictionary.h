@@ -13,6 +13,8 @@ struct Form {
   Law law;                             ///< its scales are what the runs reach, so that coefficients are forces
   std::vector<Eigen::VectorXd> starts; ///< of its parameters: a small force of either sign, and what shapes it may have
   std::string listed = {};             ///< id of the effect that it is, which goes by that; empty: of none
+  std::vector<Eigen::Index> listed_order = {};  ///< places of its parameters in the order in which that effect has them
+  double per_coefficient = 1;          ///< what that effect has for its first parameter, over the law's
 };
 
 /// How far the runs of a fit take the states that a law may look at: largest absolute values.
@@ -33,6 +35,10 @@ Reach reach_of(const BesideUnknownForces& beside);
 std::vector<Form> dictionary(const Rig& rig, const Reach& reach);
 /// Ids of the effects of the list that its forms are.
 std::vector<std::string> listed_forms();
+/// Laws of the list as formulas: those, and cubic stiffness and damping and a gap in the torsional drive, which a line of the dictionary has with a free exponent or not at all.
+std::vector<Form> laws_of_the_list(const Rig& rig, const Reach& reach);
+/// Parameters of the effect that a form of the list is, where its own stand here; those that it lacks where they start.
+Eigen::VectorXd as_listed(const Form& form, const Eigen::VectorXd& own);
 
 /// Parameters in which the force of a law of the dictionary is linear: those called c, c2 ... , f and k.
 std::vector<Eigen::Index> coefficients_of(const Law& law);

@@ -13,6 +13,7 @@
 #include "core/effects/effect.h"
 #include "core/law/law_effect.h"
 #include "core/numerics/in_parallel.h"
+#include "core/numerics/time_limit.h"
 #include "fit/laws/screen.h"
 #include "fit/search/decays_first.h"
 #include "fit/search/left_of_runs.h"
@@ -50,6 +51,11 @@ Eigen::VectorXd values_of(const JointProblem& joint, const Form& form, const std
   for (const Unknown& u : joint.unknowns())
     if (const Parameter& p = joint.parameter(u); p.effect == id) values[p.place] = u.value;
   return values;
+}
+
+/// How many parameters all runs share.
+Eigen::Index shared_parameters(const std::vector<Parameter>& parameters) {
+  return std::count_if(parameters.begin(), parameters.end(), [](const Parameter& p) { return !p.per_run; });
 }
 
 /// Whether there is a mismatch in the decays, of which the states that they ask for can tell.
@@ -124,6 +130,49 @@ std::vector<std::string> LawSearch::forms_worth_a_fit(const Trial& base, const P
   return worth_it;
 }
 
+/// What the decays ask for, most evidence first: laws of the list and formulas of the dictionary, each where the regression on the states has it. A formula's evidence is told with BIC for its parameters.
+std::vector<LawSearch::AskedFor> LawSearch::asked_by_decays() const {
+  const BesideUnknownForces beside = beside_unknown_forces(base_.arrival.joint);
+  const Reach reach = reach_of(beside);
+  const std::vector<std::string> of_list = of_the_list(base_);
+  std::vector<Form> forms = laws_of_the_list(problem_.rig, reach);
+  std::erase_if(forms, [&](const Form& form) { return !is_among(of_list, form.listed); });
+  for (Form& form : dictionary(problem_.rig, reach))
+    if (form.listed.empty()) forms.push_back(std::move(form));
+  for (Form& form : forms) form.starts = shapes_of(form, Grid::fine);
+  const std::vector<Screened> screened = screen(forms, beside);
+  double samples = 0, without = INFINITY;
+  for (const double n : base_.samples) samples += n;
+  for (const Screened& s : screened) without = std::min(without, s.deviance + s.gain);
+  std::vector<AskedFor> asked;
+  for (std::size_t i = 0; i < forms.size(); ++i) {
+    if (!(screened[i].gain > decisive)) continue;
+    forms[i].starts = {screened[i].start};
+    const double evidence = without - screened[i].deviance - std::log(samples) * static_cast<double>(forms[i].law.parameters.size());
+    asked.push_back({std::move(forms[i]), evidence});
+  }
+  sort_by(asked, [](const AskedFor& a) { return -a.evidence; });
+  if (!asked.empty()) std::erase_if(asked, [most = asked.front().evidence](const AskedFor& a) { return !(a.evidence > decisive) || a.evidence < half_of_it * most; });
+  if (asked.size() > most_in_full) asked.resize(most_in_full);
+  return asked;
+}
+
+/// The base with that law where the decays have it.
+Trial LawSearch::begun_with(const AskedFor& asked) {
+  const Form& form = asked.form;
+  const std::string id = form.listed.empty() ? form.law.id() : form.listed;
+  if (form.listed.empty()) problem_.rig.laws.push_back(as_effect(form));
+  std::vector<std::string> set = base_.effects;
+  set.push_back(id);
+  Trial trial{set, transferred(problem_, base_.arrival, std::make_shared<const AeroelasticModel>(model_of(problem_.rig, problem_.runs, problem_.circulation, set)))};
+  const Eigen::VectorXd values = form.listed.empty() ? form.starts.front() : as_listed(form, form.starts.front());
+  for (Unknown* u : unknowns_of(trial.arrival.joint, id)) {
+    const Parameter& p = trial.arrival.joint.parameter(*u);
+    u->value = std::clamp(values[p.place], p.lower, p.upper);
+  }
+  return trial;
+}
+
 /// Effects of the list that may be at work beside `base`.
 std::vector<std::string> LawSearch::of_the_list(const Trial& base) const {
   std::vector<Conditions> conditions;
@@ -173,38 +222,58 @@ LawSearch::Prospects LawSearch::rivals(const Promised& promised, const std::vect
   return forms;
 }
 
-/// By the free decays; runs that are driven from first guesses, in full.
-void LawSearch::follow_decays(Trial& trial, const Trial& base) const {
-  hold_undetermined(trial);
-  if (all_driven(base.arrival.joint)) follow_nonlinear(problem_, trial, base, INFINITY);
-  else if (nonlinear(trial)) trial.ruled_out = !fit_decays_first(trial, base, shows_in_decays(base));
+/// The same of those that the decays ask for.
+std::vector<Trial> LawSearch::rivals(const std::vector<AskedFor>& asked, const std::vector<Trial>& tried) {
+  asked_forms_ = true;
+  const auto explains = std::find_if(tried.begin(), tried.end(), [&](const Trial& t) { return is_explained(t); });
+  std::vector<Trial> forms;
+  for (const AskedFor& a : asked) {
+    if (!a.form.listed.empty()) {
+      if (explains != tried.end()) break;  // what explains the runs is asked for more than the others
+      continue;
+    }
+    if (explains != tried.end() && shared_parameters(a.form.law.parameters) > shared_parameters(effect(problem_.rig, explains->effects.back()).parameters_on(problem_.rig))) continue;
+    forms.push_back(begun_with(a));
+  }
+  return forms;
 }
 
-/// Fitted in full, those that are worth it. Of the list, where a mismatch is too large for two laws to explain alike, the simplest comes first, and none behind one that leaves nothing. Forms are all fitted: some are rivals.
-std::vector<Trial> LawSearch::followed(std::vector<Trial> tried, const Trial& base) const {
+/// By the free decays; runs that are driven from first guesses, in full.
+void LawSearch::follow_decays(Trial& trial, const Trial& base, bool from_here) const {
+  hold_undetermined(trial);
+  if (all_driven(base.arrival.joint)) follow_nonlinear(problem_, trial, base, INFINITY);
+  else if (nonlinear(trial)) trial.ruled_out = !fit_decays_first(trial, base, from_here);
+}
+
+/// The simplest first.
+void LawSearch::in_order_of_parameters(std::vector<Trial>& tried) const {
+  sort_by(tried, [&](const Trial& t) {
+    constexpr double far_dearer = 100;  // what follows its runs in small steps, than a further parameter
+    const auto parameters = static_cast<double>(effect(problem_.rig, t.effects.back()).parameters_on(problem_.rig).size());
+    return parameters + (decays_decide(t) ? far_dearer : 0) - std::clamp(t.score, 0.0, 1.0);
+  });
+}
+
+/// Fits in full those that are worth it, and adds them to `all`; where the limits of the search are reached, what the decays have told by then. Of the list, where a mismatch is too large for two laws to explain alike, none behind one that leaves nothing. Forms are all fitted: some are rivals.
+/// `from_here`: laws are followed from the sizes at which they stand only.
+void LawSearch::follow(std::vector<Trial> tried, const Trial& base, bool from_here, std::vector<Trial>& all) const {
   const bool driven = all_driven(base.arrival.joint), by_decays = shows_in_decays(base);
   const bool one_will_do = base.reduced_chi2() > nearly_explained && std::none_of(tried.begin(), tried.end(), [](const Trial& t) { return is_law_id(t.effects.back()); });
-  if (one_will_do)
-    sort_by(tried, [&](const Trial& t) {
-      constexpr double far_dearer = 100;  // what follows its runs in small steps, than a further parameter
-      const auto parameters = static_cast<double>(effect(problem_.rig, t.effects.back()).parameters_on(problem_.rig).size());
-      return parameters + (decays_decide(t) ? far_dearer : 0) - std::clamp(t.score, 0.0, 1.0);
-    });
   const auto excess = [](const Trial& t) { return std::max(0.0, left_of_decays(t) - 1); };
   const auto follows_decays = [&](const Trial& t) { return !t.ruled_out && (!by_decays || excess(t) < explained - 1); };
   const auto is_near = [&](const Trial& t) { return !by_decays || left_of_decays(t) < nearly_explained; };  // what leaves more of the decays is at most what another law acts beside
-  std::vector<Trial> all;
+  const std::size_t others = all.size();
   double least = INFINITY;
-  for (std::size_t first = 0, end = 0; first < tried.size(); first = end) {
+  const auto follow_some = [&](std::size_t first, std::size_t& end) {
     if (one_will_do) {
       bool follows = false;
       for (; end < tried.size() && !follows; ++end) {
-        follow_decays(tried[end], base);
+        follow_decays(tried[end], base, from_here && by_decays);
         follows = follows_decays(tried[end]);
       }
     } else {
       end = tried.size();
-      in_parallel(end, [&](std::size_t i) { follow_decays(tried[i], base); });
+      in_parallel(end, [&](std::size_t i) { follow_decays(tried[i], base, from_here && by_decays); });
     }
     // Of thousands of samples twice the excess of another is beyond any evidence.
     for (std::size_t i = first; i < end; ++i)
@@ -215,10 +284,19 @@ std::vector<Trial> LawSearch::followed(std::vector<Trial> tried, const Trial& ba
     in_parallel(all.size() - before, [&](std::size_t i) {
       if (!driven && is_near(all[before + i])) follow_further(all[before + i], INFINITY);
     });
-    if (one_will_do && std::any_of(all.begin(), all.end(), leaves_nothing)) break;
+  };
+  try {
+    for (std::size_t first = 0, end = 0; first < tried.size(); first = end) {
+      follow_some(first, end);
+      if (one_will_do && std::any_of(all.begin() + static_cast<std::ptrdiff_t>(others), all.end(), leaves_nothing)) break;
+    }
+  } catch (const OutOfTime&) {
+    TimeLimit::lift();
+    for (Trial& t : tried)
+      if (!t.effects.empty() && !t.ruled_out && std::isfinite(t.decays.chi2)) all.push_back(std::move(t));
+    for (std::size_t i = others; i < all.size(); ++i) measure(all[i]);
+    throw;
   }
-  sort_by(all, [&](const Trial& t) { return bic_difference(t, base_); });
-  return all;
 }
 
 /// To first order: then they are tried before any form.
@@ -229,29 +307,47 @@ bool LawSearch::signals_leave_nothing(const Promised& promised) const {
 }
 
 /// Whether the best of these, the first, asks for another law beside it.
-bool LawSearch::goes_on(const std::vector<Trial>& tried) const {
+bool LawSearch::goes_on(const std::vector<Trial>& tried) {
   if (tried.empty() || tried.front().effects.size() >= most_effects || runs_away(tried.front()) || !leaves_something_(tried.front())) return false;
   const bool takes_from_decays = shows_in_decays(base_) && left_of_decays(tried.front()) < half_of_it * left_of_decays(base_);  // other runs may not have been followed
-  return (takes_from_decays || bic_difference(tried.front(), base_) < 0) && !is_no_law_(tried.front());
+  return (takes_from_decays || bic_difference(tried.front(), base_) < 0) && !is_explained(tried.front());
+}
+
+/// Whether it leaves nothing, or what noise of a colour or the rig's description explains.
+bool LawSearch::is_explained(const Trial& trial) {
+  if (is_among(explained_, trial.effects.back())) return true;
+  if (leaves_something_(trial) && !(trial.reduced_chi2() < nearly_explained && is_no_law_(trial))) return false;
+  explained_.push_back(trial.effects.back());
+  return true;
 }
 
 /// A search among many ends before the least chi-square of any: where it is near, the first is taken there before it is asked what it leaves. Of runs that are driven, from first guesses with what is known of the law by now.
-void LawSearch::settle_first(std::vector<Trial>& tried) const {
+void LawSearch::settle_first(std::vector<Trial>& tried) {
   if (tried.empty() || tried.front().is_settled || !leaves_something_(tried.front()) || tried.front().reduced_chi2() > nearly_explained || decays_decide(tried.front()) || bic_difference(tried.front(), base_) >= 0) return;
   if (all_driven(tried.front().arrival.joint)) fit_from_first_guesses(problem_, tried.front());
   settle(tried.front());
-  tried.front() = in_finer_steps(std::move(tried.front()));
+  if (!is_explained(tried.front())) tried.front() = in_finer_steps(std::move(tried.front()));
   tried.front().is_settled = true;
 }
 
 std::vector<Trial> LawSearch::search() {
+  std::vector<Trial> all;
+  try {
+    search_in_order(all);
+  } catch (const OutOfTime&) {  // what has been fitted stands
+    TimeLimit::lift();
+  }
+  std::erase_if(all, runs_away);
+  sort_by(all, [&](const Trial& t) { return bic_difference(t, base_); });
+  return all;
+}
+
+void LawSearch::search_in_order(std::vector<Trial>& all) {
   const auto tell = [&](const Trial& base) {
     if (problem_.progress) problem_.progress("looking for the law of what is missing" + (base.effects.empty() ? std::string() : " beside " + base.effects.back()));
   };
-  std::vector<Trial> all;
-  const auto follow = [&](Prospects asked, const Trial& base) {
-    std::vector<Trial> fitted = followed(std::move(asked.laws), base);
-    std::move(fitted.begin(), fitted.end(), std::back_inserter(all));
+  const auto try_all = [&](std::vector<Trial> trials, const Trial& base, bool from_here = true) {
+    follow(std::move(trials), base, from_here, all);
     sort_by(all, [&](const Trial& t) { return bic_difference(t, base_); });
     settle_first(all);
   };
@@ -262,23 +358,41 @@ std::vector<Trial> LawSearch::search() {
   };
   tell(base_);
   Promised promised;
-  if (among_ == Among::laws_and_forms) {
-    screened_ = screened_beside(base_, listed(base_));
+  const bool by_decays = among_ == Among::laws_and_forms && base_.reduced_chi2() > nearly_explained && shows_in_decays(base_);
+  std::vector<AskedFor> asked;
+  if (by_decays) {
+    asked = asked_by_decays();
+    std::vector<Trial> listed_laws;
+    for (const AskedFor& a : asked)
+      if (!a.form.listed.empty()) listed_laws.push_back(begun_with(a));
+    try_all(std::move(listed_laws), base_, false);
+  }
+  const bool explained_by_one = std::any_of(all.begin(), all.end(), [&](const Trial& t) { return is_explained(t); });
+  if (among_ == Among::laws_and_forms && !explained_by_one) {
+    std::vector<std::string> ids = listed(base_);
+    std::erase_if(ids, [&](const std::string& id) { return std::any_of(asked.begin(), asked.end(), [&](const AskedFor& a) { return a.form.listed == id; }); });
+    screened_ = screened_beside(base_, ids);
     Prospects laws = prospects(base_, screened_, {});
     promised = laws.promised;
-    follow(std::move(laws), base_);
+    in_order_of_parameters(laws.laws);
+    try_all(std::move(laws.laws), base_);
   }
-  if (signals_leave_nothing(promised)) return all;
-  asked_forms_ = true;
-  follow(rivals(promised, all), base_);
+  if (!explained_by_one && signals_leave_nothing(promised)) return;
+  if (by_decays) {
+    try_all(rivals(asked, all), base_);
+  } else {
+    asked_forms_ = true;
+    try_all(rivals(promised, all).laws, base_);
+  }
   if (goes_on(all)) {
     Trial first = all.front();
     tell(first);
     if (!first.is_settled && !decays_decide(first) && !all_driven(first.arrival.joint)) settle(first);  // its motions may not have been followed, along which the second is to be seen
     Prospects second = prospects(first, screened_beside(first, listed(first)), {});
     promised = second.promised;
-    follow(std::move(second), first);
-    if (goes_on(all)) follow(prospects(first, screened_beside(first, forms_worth_a_fit(first, promised)), promised), first);
+    in_order_of_parameters(second.laws);
+    try_all(std::move(second.laws), first);
+    if (goes_on(all)) try_all(prospects(first, screened_beside(first, forms_worth_a_fit(first, promised)), promised).laws, first);
   }
   if (!all.empty() && all.front().effects.size() > 1) {
     problem_.rig.laws = all.front().arrival.joint.model().rig().laws;
@@ -287,9 +401,6 @@ std::vector<Trial> LawSearch::search() {
   in_parallel(all.size(), [&](std::size_t i) {  // rivals are told apart by less than where a search among many ends
     if ((leaves_nothing(all[i]) || (i == 0 && all[i].reduced_chi2() < nearly_explained)) && !decays_decide(all[i]) && !all[i].is_settled) settle(all[i]);
   });
-  std::erase_if(all, runs_away);
-  sort_by(all, [&](const Trial& t) { return bic_difference(t, base_); });
-  return all;
 }
 
 }  // namespace unrig

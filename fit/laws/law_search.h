@@ -34,7 +34,7 @@ class LawSearch {
   /// noise of a colour explains that, or the rig's description.
   LawSearch(FitProblem& problem, const Trial& base, Asked leaves_something, Asked is_no_law, Among among);
 
-  /// All sets that were fitted in full, `base` with one law more or two, the best first; empty where no form explains anything.
+  /// All sets that were fitted in full, `base` with one law more or two, the best first; empty where no form explains anything. Where the limits of the search are reached, those that were followed by then.
   std::vector<Trial> search();
   /// Effects of the list as they were screened beside `base`, each by itself; none where the list was not asked.
   std::vector<Trial> take_screened() { return std::move(screened_); }
@@ -51,6 +51,15 @@ class LawSearch {
     std::vector<Trial> laws;
     Promised promised;
   };
+  /// A law that the free decays ask for.
+  struct AskedFor {
+    Form form;
+    double evidence = 0;  ///< twice the log likelihood beyond that without a law, less BIC's for its parameters
+  };
+  std::vector<AskedFor> asked_by_decays() const;
+  Trial begun_with(const AskedFor& asked);
+  void in_order_of_parameters(std::vector<Trial>& tried) const;
+  std::vector<Trial> rivals(const std::vector<AskedFor>& asked, const std::vector<Trial>& tried);
   std::vector<Trial> screened_beside(const Trial& base, const std::vector<std::string>& ids) const;
   Prospects prospects(const Trial& base, std::vector<Trial> screened, const Promised& known, double least = half_of_it) const;
   Prospects rivals(const Promised& promised, const std::vector<Trial>& tried);
@@ -58,16 +67,19 @@ class LawSearch {
   std::vector<double> screen_forms(const Trial& base, const Screening& screening, std::vector<Form>& forms, const std::vector<std::size_t>& which);
   std::vector<std::string> forms_worth_a_fit(const Trial& base, const Promised& known);
   std::vector<std::string> of_the_list(const Trial& base) const;
-  void follow_decays(Trial& trial, const Trial& base) const;
-  void settle_first(std::vector<Trial>& tried) const;
-  std::vector<Trial> followed(std::vector<Trial> tried, const Trial& base) const;
-  bool goes_on(const std::vector<Trial>& tried) const;
+  void follow_decays(Trial& trial, const Trial& base, bool from_here) const;
+  bool is_explained(const Trial& trial);
+  void settle_first(std::vector<Trial>& tried);
+  void follow(std::vector<Trial> tried, const Trial& base, bool from_here, std::vector<Trial>& all) const;
+  void search_in_order(std::vector<Trial>& all);
+  bool goes_on(const std::vector<Trial>& tried);
 
   FitProblem& problem_;
   const Trial& base_;
   Asked leaves_something_, is_no_law_;
   Among among_;
   std::vector<Trial> screened_;
+  std::vector<std::string> explained_;  // last effects of sets that are known to leave nothing but noise of a colour or the rig's description
   bool asked_forms_ = false;
 };
 

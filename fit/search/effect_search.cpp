@@ -396,12 +396,14 @@ bool fit_decays_first(Trial& trial, const Trial& base, bool from_here) {
   trial.decays = fit_decays(joint, trial.effects.back(), from_here);
   const bool helps = trial.decays.chi2 - 1 < worth_it * (before - 1);
   measure(trial);
-  if (helps)
+  if (helps) {
+    constexpr double astray = 10;
     in_parallel(joint.runs().size(), [&](std::size_t r) {  // c of the others still is the baseline's
-      constexpr double astray = 10;
       RunResidual& run = joint.runs()[r];
       if (run.takes_small_steps(joint.theta(r)) || trial.variance[r] > astray) find_motion(run, joint.theta(r));
     });
+    if (!takes_small_steps(joint) && trial.decays.chi2 < nearly_explained) fit_own_parameters(joint, astray);
+  }
   temper(joint);
   measure(trial);
   return helps;

@@ -92,7 +92,46 @@ void LawSmoother::look_at_laws(const VectorXd& theta) {
     offset_ = VectorXd::Zero(channels_);
     return;
   }
+  follow_memories(theta);
   for (Index k = 0; k < samples_; ++k) answer_at(k, theta);
+}
+
+/// The state that law `i` is the rate of and nothing else drives; -1 where it is a force.
+Index LawSmoother::memory_of(Index i) const {
+  const VectorXd drives = system_.B.value.col(system_.B.cols() - laws_ + i);
+  Index memory = 0;
+  drives.cwiseAbs().maxCoeff(&memory);
+  return drives == VectorXd::Unit(states_, memory) && system_.A.value.row(memory).isZero(0) ? memory : -1;
+}
+
+/// Memories along the trajectory as their laws have them, by the trapezoidal rule: no disturbance acts on them, and about a memory that has not been followed its law has slopes that lead astray.
+void LawSmoother::follow_memories(const VectorXd& theta) {
+  if (arguments_.accelerations) return;
+  constexpr int most = 20;
+  constexpr double arrived = 1e-9;
+  const Index given = system_.B.cols() - laws_;
+  for (Index i = 0; i < laws_; ++i) {
+    const Index memory = memory_of(i);
+    if (memory < 0) continue;
+    const Feedback& f = system_.feedback[static_cast<std::size_t>(i)];
+    const auto own = Eigen::seqN(arguments_.first[static_cast<std::size_t>(i)], f.sees.rows());
+    const MatrixXd sees = arguments_.sees.value(own, Eigen::all), sees_input = arguments_.sees_input.value(own, Eigen::seqN(0, given));
+    const auto seen_at = [&](Index k) { return VectorXd(given > 0 ? VectorXd(sees * state_.col(k) + sees_input * inputs_.row(k).transpose()) : VectorXd(sees * state_.col(k))); };
+    for (Index k = 0; k + 1 < samples_; ++k) {
+      const double before = state_(memory, k), half = exact_.dt / 2, rate = force_of(f, seen_at(k).data(), theta).value;
+      double& z = state_(memory, k + 1);
+      z = before;
+      for (int step = 0; step < most; ++step) {
+        const FeedbackForce at_z = force_of(f, seen_at(k + 1).data(), theta);
+        double slope = 0;
+        for (Index a = 0; a < f.sees.rows(); ++a) slope += at_z.slope[static_cast<std::size_t>(a)] * sees(a, memory);
+        const double change = (before + half * (rate + at_z.value) - z) / (1 - half * slope);
+        if (!std::isfinite(change)) break;
+        z += change;
+        if (!(std::abs(change) > arrived * (std::abs(z) + arrived))) break;
+      }
+    }
+  }
 }
 
 /// The forces at one sample, f = law(sees x + sees_input [u; f]), by Newton's method where a law sees them itself; and how they answer to a change of the state and of theta.
