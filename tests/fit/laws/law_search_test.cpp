@@ -10,11 +10,15 @@
 #include <string>
 
 #include "core/law/law_effect.h"
+#include "core/numerics/time_limit.h"
+#include "core/numerics/work.h"
+#include "core/propagate/feedback_force.h"
 #include "fit/diagnose/diagnose.h"
 #include "fit/diagnose/selection.h"
 #include "fit/laws/found_law.h"
 #include "fit/laws/screen.h"
 #include "tests/fit/one_mode.h"
+#include "tests/support/sample_data.h"
 
 namespace unrig {
 namespace {
@@ -168,6 +172,99 @@ TEST(Screen, PutsTheTruthFirstOrSecond) {
       if (!forms[i].law.name.starts_with("curve") && screened[i].gain > own) ++better;
     EXPECT_LE(better, 1) << truth.law;
   }
+}
+
+/// What the screen says of a law of the list is where its effect begins.
+TEST(Screen, TellsWhereAnEffectOfTheListBegins) {
+  const double spring = 0.08 * stiffness, damper = 2e-4, force = 0.6, speed = 0.1;
+  struct Listed {
+    const char* id;
+    std::function<double(double, double)> force;
+    std::vector<double> parameters;
+  };
+  const std::vector<Listed> list{
+      {"cubic-stiffness", [&](double x, double) { return -spring * x * x * x; }, {spring}},
+      {"cubic-damping", [&](double, double v) { return -damper * v * v * v; }, {damper}},
+      {"coulomb-friction", [&](double, double v) { return -force * std::tanh(v / speed); }, {force}},
+  };
+  for (const Listed& truth : list) {
+    const FitProblem problem = two_decays(truth.force);
+    const Trial base = fit_baseline(problem);
+    const BesideUnknownForces beside = beside_unknown_forces(base.arrival.joint);
+    std::vector<Form> forms = laws_of_the_list(problem.rig, reach_of(beside));
+    for (Form& form : forms) form.starts = shapes_of(form, Grid::fine);
+    const std::vector<Screened> screened = screen(forms, beside);
+    std::size_t best = 0;
+    for (std::size_t i = 0; i < forms.size(); ++i)
+      if (screened[i].gain > screened[best].gain) best = i;
+    EXPECT_EQ(forms[best].listed, truth.id);
+    const VectorXd values = as_listed(forms[best], screened[best].start);
+    ASSERT_EQ(values.size(), static_cast<Index>(effect(truth.id).parameters.size()));
+    // Between the shapes that are tried, and beside shifts of stiffness and damping, a start is a third off at most.
+    for (std::size_t k = 0; k < truth.parameters.size(); ++k) EXPECT_NEAR(values[static_cast<Index>(k)] / truth.parameters[k], 1, 0.33) << truth.id << k;
+  }
+}
+
+/// As formulas, with the stiffness that the gap takes its couple from.
+TEST(Dictionary, HasTheForcesOfTheListsEffects) {
+  const Rig rig = read_rig(test::null_campaign("rig.toml"));
+  const unrig::Run run = read_run(test::null_campaign("dry_pluck.csv"));
+  Reach reach;
+  reach.x = 0.01, reach.v = 0.3, reach.a = 9, reach.twist = 0.02, reach.twist_rate = 2, reach.seconds = 10, reach.force = 20, reach.moment = 0.5;
+  const std::vector<Form> forms = laws_of_the_list(rig, reach);
+  ASSERT_EQ(forms.size(), 5u);
+  for (Form form : forms) {
+    for (Parameter& p : form.law.parameters) p.upper = 1e6;
+    Rig with_law = rig;
+    add_law(with_law, form.law);
+    const Basis basis = make_basis(rig, Index{2}, Index{1});
+    const AeroelasticModel listed = AeroelasticModel(rig, basis, wagner(Wagner::jones)).with_effects({form.listed}), law = AeroelasticModel(with_law, basis, wagner(Wagner::jones)).with_effects({form.law.id()});
+    VectorXd own = form.starts.front(), theta = listed.start_values(), as_law = law.start_values();
+    if (form.listed == "freeplay") {
+      const double shape = basis.twist(rig.submerged.back() - 1, basis.normal_modes), by_torsion = basis.omega[basis.normal_modes];
+      own[form.listed_order[1]] = by_torsion * by_torsion / (shape * shape);
+    }
+    theta.tail(static_cast<Index>(effect(form.listed).parameters.size())) = as_listed(form, own);
+    as_law.tail(own.size()) = own;
+    const Conditions conditions = conditions_of(run);
+    const LinearSystem a = listed.system(conditions, theta, {"gauge"}), b = law.system(conditions, as_law, {"gauge"});
+    // The force of the last law and where it acts, at states of a hundredth of a metre and a radian.
+    ASSERT_EQ(a.feedback.size(), 1u);
+    ASSERT_EQ(b.feedback.size(), 1u);
+    VectorXd state = VectorXd::LinSpaced(a.states(), 0.011, 0.003);
+    const auto pushed = [&](const LinearSystem& s, const VectorXd& parameters) {
+      const VectorXd seen = s.feedback.front().sees * state;
+      return VectorXd(s.A.value * state + s.B.value.rightCols(1) * force_of(s.feedback.front(), seen.data(), parameters).value);
+    };
+    const VectorXd free = listed.system(conditions, theta, {"gauge"}).A.value * state, moved = pushed(a, theta), by_law = pushed(b, as_law);
+    EXPECT_LT((moved - by_law).norm(), 1e-9 * (moved - free).norm() + 1e-12 * moved.norm()) << form.listed;
+    EXPECT_GT((moved - free).norm(), 0) << form.listed;
+  }
+}
+
+/// What has been followed by the time a limit is reached stands.
+TEST(LawSearch, AStoppedSearchKeepsWhatItHas) {
+  const double spring = 0.08 * stiffness;
+  FitProblem problem = two_decays([&](double x, double) { return -spring * x * x * x; });
+  const Trial base = fit_baseline(problem);
+  const auto leaves_something = [](const Trial& t) { return what_remains(t).found; };
+  const auto search = [&](std::uint64_t most) {
+    const WorkLimit limit(most);
+    const std::uint64_t before = work_done();
+    const std::vector<Trial> found = LawSearch(problem, base, leaves_something, never, LawSearch::Among::laws_and_forms).search();
+    return std::pair(found, work_done() - before);
+  };
+  constexpr std::uint64_t any = 1'000'000'000'000;
+  const auto [whole, work] = search(any);
+  ASSERT_FALSE(whole.empty());
+  EXPECT_EQ(whole.front().effects, std::vector<std::string>{"cubic-stiffness"});
+  std::size_t some = 0;
+  for (const double share : {0.5, 0.7, 0.8, 0.9, 0.95, 0.98}) {
+    const std::vector<Trial> stopped = search(static_cast<std::uint64_t>(share * static_cast<double>(work))).first;
+    for (const Trial& t : stopped) EXPECT_EQ(t.variance.size(), problem.runs.size()) << share;
+    some += stopped.empty() ? 0 : 1;
+  }
+  EXPECT_GT(some, 0u) << "the decays are followed before the end";
 }
 
 TEST(Dictionary, ReadsBackAsItIsWritten) {

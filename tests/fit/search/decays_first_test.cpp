@@ -133,6 +133,20 @@ TEST(DecaysFirst, FrictionThatStopsTheRigIsFoundFromARigThatIsFarOff) {
   EXPECT_NEAR(unknowns_of(trial.arrival.joint, "coulomb-friction").front()->value / hidden.parameters.front(), 1, 0.01);
 }
 
+/// From a force of twice and a displacement of half of what was hidden, of the shape of neither. A memory that is not followed along the trajectory grows like the displacement over that at which it yields.
+TEST(DecaysFirst, HysteresisIsFoundFromSizesThatAreFarOff) {
+  for (const unsigned seed : {11u, 12u, 13u}) {
+    const Hidden hidden = hide("bouc-wen", seed, 0);
+    ASSERT_GT(hidden.baseline.reduced_chi2(), 10) << seed;
+    Trial trial = prepare(*hidden.problem, hidden.baseline, {"bouc-wen"});
+    const std::vector<Unknown*> own = unknowns_of(trial.arrival.joint, "bouc-wen");
+    ASSERT_EQ(own.size(), 4u);
+    const double start[] = {2 * hidden.parameters[0], 0.5 * hidden.parameters[1], 0.5, 0.5};
+    for (std::size_t i = 0; i < own.size(); ++i) own[i]->value = start[i];
+    EXPECT_LT(fit_decays(trial.arrival.joint, "bouc-wen", true).chi2, 1.15) << "what counts as explained, seed " << seed;
+  }
+}
+
 /// `unrig fit --effect` from the rig file: a spring that stiffens so much that the fit without it leaves 80 times the noise of the decays and more.
 TEST(DecaysFirst, AFitWithAStrongSpringNamedArrives) {
   constexpr unsigned seed = 5, trial = 19;
