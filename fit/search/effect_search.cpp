@@ -441,7 +441,14 @@ void follow_further(Trial& trial, double least) {
 
 bool follow_nonlinear(const FitProblem& problem, Trial& trial, const Trial& base, double least) {
   if (all_driven(trial.arrival.joint)) {
-    fit_from_first_guesses(problem, trial);
+    Trial guessed = trial;
+    fit_from_first_guesses(problem, guessed);
+    if (guessed.excess() < half_of_it * base.excess()) {
+      trial = std::move(guessed);
+      return true;
+    }
+    if (fit_decays_first(trial, base, true)) fit_fully(trial, 2);
+    if (!(trial.excess() < guessed.excess())) trial = std::move(guessed);
     return true;
   }
   trial.ruled_out = !fit_decays_first(trial, base);

@@ -97,8 +97,8 @@ bool fit_decays_first(Trial& trial, const Trial& base, bool from_here = false);
 /// Fits everything, in full where that leaves less than `least`, once fit_decays_first has told theta.
 void follow_further(Trial& trial, double least);
 
-/// Fits a prepared trial whose last effect is nonlinear: by the free decays first, then everything, in full where that leaves less than `least`; runs that are driven from first guesses. False where the free
-/// decays speak against it.
+/// Fits a prepared trial whose last effect is nonlinear: by the free decays first, then everything, in full where that leaves less than `least`; runs that are driven from first guesses, and
+/// where these leave more than half of what `base` does along trajectories that trust the law more and more, as free decays. False where the free decays speak against it.
 bool follow_nonlinear(const FitProblem& problem, Trial& trial, const Trial& base, double least);
 
 /// The fit of a problem with its effects at work, by the road that a diagnosis takes to them: the best fit with nothing missing, the linear effects together, the nonlinear

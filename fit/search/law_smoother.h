@@ -22,7 +22,7 @@ class LawSmoother {
  public:
   /// `parameters`: those of theta that are searched. Looks at the first `most_samples` of the run, where a decay is over.
   LawSmoother(const RunResidual& run, std::vector<Eigen::Index> parameters);
-  static constexpr Eigen::Index most_samples = 20000;
+  static constexpr Eigen::Index most_samples = 5000;
   static constexpr Eigen::Index most_parts = 4;  ///< of a sample, where a law asks for small steps
 
   Eigen::Index samples() const { return readings_; }
