@@ -157,18 +157,17 @@ std::vector<LawSearch::AskedFor> LawSearch::asked_by_decays() const {
   return asked;
 }
 
-/// The base with that law where the decays have it.
-Trial LawSearch::begun_with(const AskedFor& asked) {
-  const Form& form = asked.form;
-  const std::string id = form.listed.empty() ? form.law.id() : form.listed;
-  if (form.listed.empty()) problem_.rig.laws.push_back(as_effect(form));
+/// The base with these laws of the list where the decays have them.
+Trial LawSearch::begun_with(const std::vector<AskedFor>& asked) const {
   std::vector<std::string> set = base_.effects;
-  set.push_back(id);
+  for (const AskedFor& a : asked) set.push_back(a.form.listed);
   Trial trial{set, transferred(problem_, base_.arrival, std::make_shared<const AeroelasticModel>(model_of(problem_.rig, problem_.runs, problem_.circulation, set)))};
-  const Eigen::VectorXd values = form.listed.empty() ? form.starts.front() : as_listed(form, form.starts.front());
-  for (Unknown* u : unknowns_of(trial.arrival.joint, id)) {
-    const Parameter& p = trial.arrival.joint.parameter(*u);
-    u->value = std::clamp(values[p.place], p.lower, p.upper);
+  for (const AskedFor& a : asked) {
+    const Eigen::VectorXd values = as_listed(a.form, a.form.starts.front());
+    for (Unknown* u : unknowns_of(trial.arrival.joint, a.form.listed)) {
+      const Parameter& p = trial.arrival.joint.parameter(*u);
+      u->value = std::clamp(values[p.place], p.lower, p.upper);
+    }
   }
   return trial;
 }
@@ -222,20 +221,21 @@ LawSearch::Prospects LawSearch::rivals(const Promised& promised, const std::vect
   return forms;
 }
 
-/// The same of those that the decays ask for.
-std::vector<Trial> LawSearch::rivals(const std::vector<AskedFor>& asked, const std::vector<Trial>& tried) {
+/// The same of those that the decays ask for: none where a signal promises more than any law to first order.
+LawSearch::Prospects LawSearch::rivals(const std::vector<AskedFor>& asked, const Promised& promised, const std::vector<Trial>& tried) {
   asked_forms_ = true;
   const auto explains = std::find_if(tried.begin(), tried.end(), [&](const Trial& t) { return is_explained(t); });
-  std::vector<Trial> forms;
+  std::vector<std::string> ids;
   for (const AskedFor& a : asked) {
     if (!a.form.listed.empty()) {
       if (explains != tried.end()) break;  // what explains the runs is asked for more than the others
       continue;
     }
     if (explains != tried.end() && shared_parameters(a.form.law.parameters) > shared_parameters(effect(problem_.rig, explains->effects.back()).parameters_on(problem_.rig))) continue;
-    forms.push_back(begun_with(a));
+    problem_.rig.laws.push_back(as_effect(a.form));
+    ids.push_back(a.form.law.id());
   }
-  return forms;
+  return prospects(base_, screened_beside(base_, ids), promised, 0);
 }
 
 /// By the free decays; runs that are driven from first guesses, in full.
@@ -356,19 +356,22 @@ void LawSearch::search_in_order(std::vector<Trial>& all) {
     if (among_ == Among::forms) std::erase_if(ids, [forms = listed_forms()](const std::string& id) { return !is_among(forms, id); });
     return ids;
   };
+  const auto any_explains = [&] { return std::any_of(all.begin(), all.end(), [&](const Trial& t) { return is_explained(t); }); };
   tell(base_);
   Promised promised;
   const bool by_decays = among_ == Among::laws_and_forms && base_.reduced_chi2() > nearly_explained && shows_in_decays(base_);
   std::vector<AskedFor> asked;
   if (by_decays) {
     asked = asked_by_decays();
-    std::vector<Trial> listed_laws;
-    for (const AskedFor& a : asked)
-      if (!a.form.listed.empty()) listed_laws.push_back(begun_with(a));
-    try_all(std::move(listed_laws), base_, false);
+    std::vector<AskedFor> of_list;
+    std::copy_if(asked.begin(), asked.end(), std::back_inserter(of_list), [](const AskedFor& a) { return !a.form.listed.empty(); });
+    std::vector<Trial> alone;
+    for (const AskedFor& a : of_list) alone.push_back(begun_with({a}));
+    try_all(std::move(alone), base_, false);
+    if (of_list.size() > 1 && !any_explains()) try_all({begun_with({of_list[0], of_list[1]})}, base_);
   }
-  const bool explained_by_one = std::any_of(all.begin(), all.end(), [&](const Trial& t) { return is_explained(t); });
-  if (among_ == Among::laws_and_forms && !explained_by_one) {
+  const bool found = any_explains();
+  if (among_ == Among::laws_and_forms && !found) {
     std::vector<std::string> ids = listed(base_);
     std::erase_if(ids, [&](const std::string& id) { return std::any_of(asked.begin(), asked.end(), [&](const AskedFor& a) { return a.form.listed == id; }); });
     screened_ = screened_beside(base_, ids);
@@ -377,9 +380,9 @@ void LawSearch::search_in_order(std::vector<Trial>& all) {
     in_order_of_parameters(laws.laws);
     try_all(std::move(laws.laws), base_);
   }
-  if (!explained_by_one && signals_leave_nothing(promised)) return;
+  if (!found && signals_leave_nothing(promised)) return;
   if (by_decays) {
-    try_all(rivals(asked, all), base_);
+    try_all(rivals(asked, promised, all).laws, base_);
   } else {
     asked_forms_ = true;
     try_all(rivals(promised, all).laws, base_);

@@ -57,9 +57,9 @@ class LawSearch {
     double evidence = 0;  ///< twice the log likelihood beyond that without a law, less BIC's for its parameters
   };
   std::vector<AskedFor> asked_by_decays() const;
-  Trial begun_with(const AskedFor& asked);
+  Trial begun_with(const std::vector<AskedFor>& asked) const;
   void in_order_of_parameters(std::vector<Trial>& tried) const;
-  std::vector<Trial> rivals(const std::vector<AskedFor>& asked, const std::vector<Trial>& tried);
+  Prospects rivals(const std::vector<AskedFor>& asked, const Promised& promised, const std::vector<Trial>& tried);
   std::vector<Trial> screened_beside(const Trial& base, const std::vector<std::string>& ids) const;
   Prospects prospects(const Trial& base, std::vector<Trial> screened, const Promised& known, double least = half_of_it) const;
   Prospects rivals(const Promised& promised, const std::vector<Trial>& tried);

@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <cmath>
 #include <memory>
-#include <numeric>
 #include <utility>
 
 #include "core/effects/effect.h"
@@ -147,42 +146,20 @@ class GrowingTrust {
       constexpr double share = 0.5, hardly = 1e-9;
       const VectorXd now = values();
       for (Index i = 0; i < count; ++i) rows(count * runs + i, i) = now[i] != 0 ? 1 / (share * std::abs(now[i])) : hardly * rows.col(i).norm() + 1e-300;
-      change = within_reach(rows, right);
-      set(now + change);
+      set(within_reach(now, now + rows.colPivHouseholderQr().solve(right)));
+      change = values() - now;
     }
     in_parallel(decays_.size(), [&](std::size_t d) { smoothers_[d].step(change); });
   }
 
-  /// The least squares rows * change = right with theta between half of itself and twice, and its bounds: what would go furthest beyond is held at its limit, and the others follow. Parameters that are known only
-  /// together would go astray where each was cut off by itself.
-  VectorXd within_reach(const MatrixXd& rows, const VectorXd& right) const {
-    const VectorXd now = values();
-    VectorXd lowest(now.size()), highest(now.size()), change = VectorXd::Zero(now.size());
+  VectorXd within_reach(const VectorXd& now, VectorXd then) const {
     for (Index i = 0; i < now.size(); ++i) {
       const auto [lower, upper] = bounds_at(joint_.model(), joint_.unknowns()[free_[static_cast<std::size_t>(i)]].parameter, now[i]);
-      lowest[i] = std::min(0.0, (now[i] > 0 ? std::max(lower, now[i] / 2) : lower) - now[i]);
-      highest[i] = std::max(0.0, (now[i] > 0 ? std::min(upper, 2 * now[i]) : upper) - now[i]);
+      if (now[i] > 0) then[i] = std::clamp(then[i], now[i] / 2, 2 * now[i]);
+      then[i] = std::clamp(then[i], lower, upper);
+      if (!std::isfinite(then[i])) then[i] = now[i];
     }
-    std::vector<Index> moves(static_cast<std::size_t>(now.size()));
-    std::iota(moves.begin(), moves.end(), Index{0});
-    VectorXd rest = right;
-    while (!moves.empty()) {
-      const VectorXd best = rows(Eigen::all, moves).colPivHouseholderQr().solve(rest);
-      std::size_t furthest = moves.size();
-      double most = 1;
-      for (std::size_t k = 0; k < moves.size(); ++k) {
-        const Index i = moves[k];
-        change[i] = std::isfinite(best[static_cast<Index>(k)]) ? best[static_cast<Index>(k)] : 0;
-        const double limit = change[i] > 0 ? highest[i] : lowest[i], beyond = limit != 0 ? change[i] / limit : change[i] != 0 ? INFINITY : 0;
-        if (beyond > most) most = beyond, furthest = k;
-      }
-      if (furthest == moves.size()) return change;
-      const Index i = moves[furthest];
-      change[i] = change[i] > 0 ? highest[i] : lowest[i];
-      rest -= rows.col(i) * change[i];
-      moves.erase(moves.begin() + static_cast<std::ptrdiff_t>(furthest));
-    }
-    return change;
+    return then;
   }
 
   VectorXd values() const {

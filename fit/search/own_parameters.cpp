@@ -12,62 +12,53 @@ namespace {
 
 constexpr double to_the_noise = 1.02;  // reduced chi-square: one per cent of it is chance in a few thousand samples
 
-double to_the_noise_of(const RunResidual& run) { return to_the_noise * static_cast<double>(run.degrees_of_freedom()); }
-
-/// Searches the own parameters of the one run of `alone`; `from_afar`: its motion first, as smooth as the angle shows it.
-void search_alone(JointProblem& alone, bool from_afar) {
+/// Searches the own parameters of the one run of `alone` and its motion; then, as long as that helps, with the motion once more from afar.
+void search_alone(JointProblem& alone) {
   JointProblem::SolveOptions options;
   options.iterations = 4;
   options.tolerance = 1e-2;
   options.precision = 0.5;
   options.most_evaluations = 12;
   options.enough = to_the_noise;
-  RunResidual& run = alone.runs().front();
-  if (!from_afar) alone.solve(options);
-  else if (run.takes_small_steps(alone.theta(0))) find_motion(run, alone.theta(0), true);
-  else lead_in(run, alone.theta(0), [&] { alone.solve(options); });
-}
-
-/// One run of a joint problem, its own parameters searched: from where they stand, then with the motion from afar, then, where the rig's own have gone astray, from where the rig file has them.
-JointProblem fitted_alone(const JointProblem& joint, std::size_t r) {
-  JointProblem there = joint.part({r});
-  for (Unknown& u : there.unknowns()) u.held = u.held || u.run < 0;
-  there.runs().front().temper(1);
-  JointProblem best = there;
-  const double enough = to_the_noise_of(best.runs().front());
-  double least = best.chi2();
-  const auto is_better = [&](JointProblem& other) {
-    const double left = other.chi2();
-    if (!(left < least)) return false;
-    least = left;
-    best = std::move(other);
-    return true;
-  };
+  const double enough = to_the_noise * static_cast<double>(alone.runs().front().degrees_of_freedom());
   constexpr int rounds = 2;
   for (int round = 0; round < rounds; ++round) {
-    JointProblem here = best;
-    search_alone(here, false);
-    is_better(here);
-    if (least < enough) return best;
-    JointProblem afar = best;
-    search_alone(afar, true);
-    if (!is_better(afar)) break;
+    alone.solve(options);
+    if (alone.chi2() < enough) break;
+    JointProblem other = alone;
+    if (RunResidual& run = other.runs().front(); run.takes_small_steps(other.theta(0))) find_motion(run, other.theta(0), true);
+    else lead_in(run, other.theta(0), [&] { other.solve(options); });
+    if (!(other.chi2() < alone.chi2())) break;
+    alone = std::move(other);
   }
-  if (least < enough) return best;
-  const Eigen::VectorXd start = there.model().start_values();
+}
+
+/// Whether the rig's own parameters have gone astray; then they are back where the rig file has them.
+bool back_at_the_rig(JointProblem& alone) {
+  constexpr double astray = 2;
+  const Eigen::VectorXd start = alone.model().start_values();
   bool any = false;
-  for (Unknown& u : there.unknowns()) {
-    constexpr double astray = 2;
+  for (Unknown& u : alone.unknowns()) {
     const bool near = u.value > start[u.parameter] / astray && u.value < astray * start[u.parameter];
-    if (u.held || near || !there.parameter(u).effect.empty()) continue;
+    if (u.held || near || !alone.parameter(u).effect.empty()) continue;
     u.value = start[u.parameter];
     any = true;
   }
-  if (!any) return best;
-  search_alone(there, true);
-  search_alone(there, false);
-  is_better(there);
-  return best;
+  return any;
+}
+
+/// One run of a joint problem, its own parameters searched: from where they stand and, where that ends far from the noise and they had gone astray, from where the rig file has them.
+JointProblem fitted_alone(const JointProblem& joint, std::size_t r) {
+  constexpr double far = 10;
+  JointProblem there = joint.part({r});
+  for (Unknown& u : there.unknowns()) u.held = u.held || u.run < 0;
+  there.runs().front().temper(1);
+  JointProblem alone = there;
+  search_alone(alone);
+  const bool dear = there.runs().front().takes_small_steps(there.theta(0));  // a search under a gap goes from afar as it is
+  if (dear || alone.chi2() < far * static_cast<double>(alone.runs().front().degrees_of_freedom()) || !back_at_the_rig(there)) return alone;
+  search_alone(there);
+  return there.chi2() < alone.chi2() ? there : alone;
 }
 
 }  // namespace

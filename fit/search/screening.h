@@ -42,11 +42,13 @@ class Screening {
   double largest_argument_of_readings(const JointProblem& joint) const;
   std::vector<Eigen::VectorXd> starts_of(JointProblem& joint, const std::string& id) const;
   JointProblem best_start(const JointProblem& joint, const std::string& id) const;
+  void begin_at(const FirstOrder::Promise& promise, JointProblem& joint, const std::string& id) const;
 
   const FitProblem& problem_;
   const Arrival& without_;
   Base base_;
   double left_ = 0;  // by a step in the unknowns of the fit
+  bool is_near_ = false;  // to the noise
   std::unique_ptr<const Base> at_the_rig_;     // where parameters of the fit have gone astray: what a rig moves by there says nothing of the size of a force
   std::optional<BesideUnknownForces> beside_;  // then, where there are decays
 };
