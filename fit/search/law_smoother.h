@@ -16,7 +16,8 @@ namespace unrig {
 /// with the least J = sum (noise / its sigma)^2 + sum (w / sigma)^2 over the first state, all w_k, the offsets and theta. The disturbances w_k are an error of every
 /// law that the channels show by itself (not of a clock, nor of a memory that only another law looks at) and an unknown acceleration of every coordinate, constant over a step: a sample, or a part of it where a law asks for small steps. The laws see the trajectory that the data ask for instead of one that was
 /// followed from the start, so that an error of theirs does not grow along the record: J has no further minima as long as sigma is large, and as sigma
-/// shrinks, the trajectory becomes the model's own. Noise of a colour is taken for white. Gauss-Newton, which eliminates the states from the last sample to the first: linear in the samples.
+/// shrinks, the trajectory becomes the model's own. Noise of a colour is taken for white. Memories, on which no disturbance acts, are
+/// followed along each trajectory before the laws are linearised about it. Gauss-Newton, which eliminates the states from the last sample to the first: linear in the samples.
 /// Source: B. M. Bell, SIAM Journal on Optimization 4 (1994) 626, with theta as a further state.
 class LawSmoother {
  public:

@@ -86,7 +86,7 @@ TEST(FirstOrder, PromisesWhatTheWholeLinearisationDoes) {
 TEST(FirstOrder, ALawBeginsAtItsSize) {
   int near = 0;
   for (const std::string id : {"cubic-stiffness", "cubic-damping", "filling-mass"})
-    for (unsigned seed = 1; seed <= 12; ++seed) {
+    for (unsigned seed = 1; seed <= 8; ++seed) {
       std::mt19937_64 random(seed);
       const TrialCampaign hidden = draw_campaign(campaign().rig, {id}, draw_runs(0.03, random), ideal_laboratory(), random);
       FitProblem problem;
@@ -99,7 +99,7 @@ TEST(FirstOrder, ALawBeginsAtItsSize) {
       EXPECT_NEAR(unknowns_of(joint, id).front()->value / hidden.parameters.front(), 1, 0.5) << id << " " << seed << ": the shape may stand elsewhere, and the trajectory bends";
       ++near;
     }
-  EXPECT_GE(near, 5) << "otherwise nothing was looked at";
+  EXPECT_GE(near, 3) << "otherwise nothing was looked at";
 }
 
 /// What a fit leaves that has not come to its least chi-square is no mismatch that laws take away, nor signals: shares are of what a step without them leaves.
@@ -141,6 +141,7 @@ TEST(FirstOrder, AToneIsAskedForAtItsOwnFrequency) {
 
 /// Slopes in a law's own parameters by differences, over all laws and all of their parameters. What is left falls as the prediction grows.
 TEST(FirstOrder, SlopesAreThoseOfDifferences) {
+  const FirstOrder first_order(baseline().arrival.joint);
   const Screening screening(campaign(), baseline().arrival);
   const JointProblem& base = baseline().arrival.joint;
   for (const std::string& id : laws()) {
@@ -154,9 +155,9 @@ TEST(FirstOrder, SlopesAreThoseOfDifferences) {
       ASSERT_TRUE(run.known());
       if (!effect(id).acts(campaign().rig, base.runs()[r].conditions())) continue;
       VectorXd theta = joint.theta(r);
-      std::mt19937_64 random(1);
-      theta(own) = effect(id).draw(joint.model(), 10, random).head(static_cast<Index>(own.size()));
-      if (!effect(id).frequency) theta[own.front()] *= 1e-3;  // trajectories beside strong laws are chaotic
+      if (const Effect& e = effect(id); !e.frequency)  // its size here is next to nothing, and differences would be rounding
+        theta[own.front()] = (e.starts_for ? e.starts_for(joint.model(), first_order.promise(joint, id).largest_argument) : e.starts).front()[0];
+      theta[own.front()] *= 1e-3;  // trajectories beside strong laws are chaotic
       const auto all = run.beside(joint.runs()[r], theta, own);
       for (std::size_t j = 0; j < own.size(); ++j) {
         // The rows of two calls are rotated alike but for what lies beside c and theta: inner products with what theta does, which both have, tell of the rest.
