@@ -11,10 +11,6 @@
 
 namespace unrig {
 
-namespace {
-constexpr double faint = 1e-3;  // of where its size stands: a force on trajectories that it hardly bends; not 0, where the shape of a law has no slope
-}  // namespace
-
 using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
@@ -53,6 +49,7 @@ bool FirstOrder::known() const {
 
 /// Run by run, with the effect at next to nothing where it acts; nothing of runs that are set aside.
 std::vector<FirstOrder::Beside> FirstOrder::beside(const JointProblem& with, const std::string& id, const std::vector<Index>& own, const std::vector<VectorXd>& begins) const {
+  constexpr double faint = 1e-3;  // of where its size stands: a force on trajectories that it hardly bends; not 0, where the shape of a law has no slope
   std::vector<Beside> rows(runs_.size());
   in_parallel(runs_.size(), [&](std::size_t r) {
     const RunResidual& run = with.runs()[r];
@@ -120,8 +117,6 @@ FirstOrder::Promise FirstOrder::promise(const JointProblem& with, const std::str
     const std::vector<Beside> rows = beside(with, id, own, begins);
     if (std::any_of(rows.begin(), rows.end(), [](const Beside& run) { return !run.left.allFinite(); })) break;
     const LinearStep to = step(of_effect, own, rows);
-    for (std::size_t k = 0; i == 0 && !effect(with.model().rig(), id).frequency && k < of_effect.size(); ++k)
-      if (of_effect[k].parameter == own.front()) promise.sizes.push_back(faint * of_effect[k].value + to.x[static_cast<Index>(joint_.unknowns().size() + k)]);
     promise.left = std::min(promise.left, to.left);
     Index column = static_cast<Index>(joint_.unknowns().size() + of_effect.size());
     const bool has_states = to.x.size() > column;

@@ -29,7 +29,6 @@ class FirstOrder {
   struct Promise {
     double left = INFINITY;       ///< chi-square that one linear step in all unknowns leaves, those of `with` included; infinite where a model runs away
     double largest_argument = 0;  ///< that the laws' first arguments reach
-    std::vector<double> sizes = {};  ///< of a law's first parameter, in the order of the unknowns of `with` that it is, where that step ends; of a tone that is no size: none
   };
   /// `with`: the same runs with effect `id` beside, with the shape that it stands at and a size (its first parameter, or where the states of a tone begin) that is next to nothing.
   Promise promise(const JointProblem& with, const std::string& id) const;

@@ -9,7 +9,6 @@
 #include "core/law/law_effect.h"
 #include "core/numerics/in_parallel.h"
 #include "core/propagate/feedback_force.h"
-#include "fit/search/left_of_runs.h"
 
 namespace unrig {
 namespace {
@@ -82,9 +81,6 @@ Screening::Screening(const FitProblem& problem, const Arrival& without) : proble
     glance(alone, true);
     left_ = left_by_a_step(alone);
   }
-  constexpr double near = 10;  // times the noise's power, beyond which a step to first order says little
-  is_near_ = true;
-  for (const LeftOfRun& run : left_of_runs(without.joint)) is_near_ = is_near_ && run.variance < near;
   constexpr double astray = 10;
   JointProblem moved = without.joint;
   if (!back_to_the_rig(moved, astray)) return;
@@ -171,16 +167,6 @@ Arrival transferred(const FitProblem& problem, const Arrival& without, const std
   return arrival;
 }
 
-/// Sizes of a law where a step to first order ends: near the noise its force bends no trajectory further.
-void Screening::begin_at(const FirstOrder::Promise& promise, JointProblem& joint, const std::string& id) const {
-  const std::vector<Unknown*> own = unknowns_of(joint, id);
-  for (std::size_t k = 0, size = 0; size < promise.sizes.size(); ++k) {
-    if (own[k]->parameter != own.front()->parameter) continue;
-    const Parameter& p = joint.parameter(*own[k]);
-    if (const double to = promise.sizes[size++]; to > p.lower && to < p.upper) own[k]->value = to;
-  }
-}
-
 Screening::Extended Screening::extend(const std::shared_ptr<const AeroelasticModel>& model, const std::vector<std::string>& added) const {
   Extended extended{transferred(problem_, without_, model)};
   JointProblem& joint = extended.arrival.joint;
@@ -195,13 +181,7 @@ Screening::Extended Screening::extend(const std::shared_ptr<const AeroelasticMod
   if (!at_the_rig_) joint = std::move(looked_at);
   set_starts(joint, problem_.start);
   const bool to_first_order = added.size() == 1 && base_.first_order.known() && is_law(joint, added.front());
-  if (to_first_order) {
-    const FirstOrder::Promise promise = base_.first_order.promise(joint, added.front());
-    extended.left = promise.left;
-    if (is_near_) begin_at(promise, joint, added.front());
-  } else {
-    extended.left = left_by_a_step(joint);
-  }
+  extended.left = to_first_order ? base_.first_order.promise(joint, added.front()).left : left_by_a_step(joint);
   extended.share = 1 - extended.left / left_;
   glance(joint, false);
   return extended;

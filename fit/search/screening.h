@@ -24,7 +24,7 @@ class Screening {
     double share = 0;  ///< which it promises to remove of what a step in the unknowns of the fit leaves: a fit that ended early is no mismatch that any effect takes away
   };
   /// With `model`, the one with the effects `added`, and nothing searched for yet: values of the fit without them where it has them, the best of their starts for the effects. Starts of a law are
-  /// compared, and what it promises is told, to first order about the fit (fit/search/first_order.h); where that is near the noise its size is where the step ends; of other effects by chi-square, all linear unknowns at their best.
+  /// compared, and what it promises is told, to first order about the fit (fit/search/first_order.h); of other effects by chi-square, all linear unknowns at their best.
   Extended extend(const std::shared_ptr<const AeroelasticModel>& model, const std::vector<std::string>& added) const;
 
  private:
@@ -42,13 +42,11 @@ class Screening {
   double largest_argument_of_readings(const JointProblem& joint) const;
   std::vector<Eigen::VectorXd> starts_of(JointProblem& joint, const std::string& id) const;
   JointProblem best_start(const JointProblem& joint, const std::string& id) const;
-  void begin_at(const FirstOrder::Promise& promise, JointProblem& joint, const std::string& id) const;
 
   const FitProblem& problem_;
   const Arrival& without_;
   Base base_;
   double left_ = 0;  // by a step in the unknowns of the fit
-  bool is_near_ = false;  // to the noise
   std::unique_ptr<const Base> at_the_rig_;     // where parameters of the fit have gone astray: what a rig moves by there says nothing of the size of a force
   std::optional<BesideUnknownForces> beside_;  // then, where there are decays
 };
