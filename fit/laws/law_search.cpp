@@ -53,11 +53,6 @@ Eigen::VectorXd values_of(const JointProblem& joint, const Form& form, const std
   return values;
 }
 
-/// How many parameters all runs share.
-Eigen::Index shared_parameters(const std::vector<Parameter>& parameters) {
-  return std::count_if(parameters.begin(), parameters.end(), [](const Parameter& p) { return !p.per_run; });
-}
-
 /// Whether there is a mismatch in the decays, of which the states that they ask for can tell.
 bool shows_in_decays(const Trial& base) { return has_decays(base.arrival.joint) && left_of_decays(base) > explained; }
 
@@ -224,14 +219,13 @@ LawSearch::Prospects LawSearch::rivals(const Promised& promised, const std::vect
 /// The same of those that the decays ask for: none where a signal promises more than any law to first order.
 LawSearch::Prospects LawSearch::rivals(const std::vector<AskedFor>& asked, const Promised& promised, const std::vector<Trial>& tried) {
   asked_forms_ = true;
-  const auto explains = std::find_if(tried.begin(), tried.end(), [&](const Trial& t) { return is_explained(t); });
+  const auto explains = std::find_if(tried.begin(), tried.end(), [&](const Trial& t) { return !leaves_something_(t); });  // noise of a colour takes up what another law leaves
   std::vector<std::string> ids;
   for (const AskedFor& a : asked) {
     if (!a.form.listed.empty()) {
       if (explains != tried.end()) break;  // what explains the runs is asked for more than the others
       continue;
     }
-    if (explains != tried.end() && shared_parameters(a.form.law.parameters) > shared_parameters(effect(problem_.rig, explains->effects.back()).parameters_on(problem_.rig))) continue;
     problem_.rig.laws.push_back(as_effect(a.form));
     ids.push_back(a.form.law.id());
   }
