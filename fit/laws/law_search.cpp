@@ -226,6 +226,7 @@ LawSearch::Prospects LawSearch::rivals(const std::vector<AskedFor>& asked, const
       if (explains != tried.end()) break;  // what explains the runs is asked for more than the others
       continue;
     }
+    if (explains != tried.end() && coefficients_of(a.form.law).size() > 1) continue;  // curves are for what no formula explains
     problem_.rig.laws.push_back(as_effect(a.form));
     ids.push_back(a.form.law.id());
   }
