@@ -216,14 +216,14 @@ LawSearch::Prospects LawSearch::rivals(const Promised& promised, const std::vect
   return forms;
 }
 
-/// The same of those that the decays ask for: none where a signal promises more than any law to first order.
+/// The same of those that the decays ask for: where a law of the list leaves nothing only formulas with more evidence, and none where a signal promises more than any law to first order.
 LawSearch::Prospects LawSearch::rivals(const std::vector<AskedFor>& asked, const Promised& promised, const std::vector<Trial>& tried) {
   asked_forms_ = true;
   const auto explains = std::find_if(tried.begin(), tried.end(), [&](const Trial& t) { return !leaves_something_(t); });  // noise of a colour takes up what another law leaves
   std::vector<std::string> ids;
   for (const AskedFor& a : asked) {
     if (!a.form.listed.empty()) {
-      if (explains != tried.end()) break;  // what explains the runs is asked for more than the others
+      if (explains != tried.end()) break;  // only forms with more evidence than any law of the list
       continue;
     }
     if (explains != tried.end() && coefficients_of(a.form.law).size() > 1) continue;  // curves are for what no formula explains

@@ -23,7 +23,7 @@ namespace unrig {
 /// Before anything else was tried (Among::laws_and_forms) laws are looked for where one of them promises most of all effects, signals included, to first order, and only what promises half as much: laws of the list, then
 /// forms, which are their rivals; no forms where a signal promises to leave nothing.
 ///
-/// Far from the noise a step to first order says little. Where the decays show the mismatch, laws and forms are then asked for by evidence: their forces along the states that the decays ask for, regressed on the
+/// Where more than ten times the noise is left a step to first order says little. If the decays show the mismatch, laws and forms are then asked for by evidence: their forces along the states that the decays ask for, regressed on the
 /// innovations of a filter for which the force is unknown (screen). Laws of the list come first, each from where the regression has it, then the two with most evidence together.
 ///
 /// Source: M. Alvarez, D. Luengo and N. Lawrence, Latent force models, AISTATS (2009); S. L. Brunton, J. L. Proctor and J. N. Kutz, PNAS 113 (2016) 3932, whose candidates are regressed on derivatives, here on readings.
