@@ -15,6 +15,7 @@ Effect cubic_stiffness() {
   e.kind = "stiffness";
   e.source = "Duffing, Erzwungene Schwingungen (1918)";
   e.parameters = {{"coefficient", "N/m^3", 0, -1e30, 1e30, false, "Record free decays from a small and from a large load."}, {"static_displacement", "m", 0, -1, 1, true, "Record a run at this steady load with larger motions."}};
+  e.terms = {{1}};
   e.starts = {Eigen::Vector2d(0, 0)};
   e.draw = [](const AeroelasticModel& model, double release, Effect::Random& random) -> Eigen::VectorXd {  // share of the linear force where the pluck is released
     const double stiffness = first_mode_momentum(model) * model.basis().omega[0], deflection = release / stiffness;

@@ -398,6 +398,7 @@ void LawSearch::search_in_order(std::vector<Trial>& all) {
   }
   in_parallel(all.size(), [&](std::size_t i) {  // rivals are told apart by less than where a search among many ends
     if ((leaves_nothing(all[i]) || (i == 0 && all[i].reduced_chi2() < nearly_explained)) && !decays_decide(all[i]) && !all[i].is_settled) settle(all[i]);
+    if (leaves_nothing(all[i]) && !decays_decide(all[i])) leave_out_terms(all[i]);  // forms have none
   });
 }
 

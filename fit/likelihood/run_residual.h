@@ -166,6 +166,7 @@ class RunResidual {
 
   void start_from(const Eigen::VectorXd& linear) {
     last_linear_ = linear;
+    guide_ = {};
     forget_solutions();
   }
 

@@ -9,7 +9,9 @@
 #include "core/effects/effect.h"
 #include "core/law/law_effect.h"
 #include "core/numerics/in_parallel.h"
+#include "fit/fit_description.h"
 #include "fit/search/arrival.h"
+#include "fit/search/effect_search.h"
 #include "fit/search/law_smoother.h"
 #include "fit/solver/least_squares.h"
 
@@ -338,6 +340,13 @@ double follow_exactly(JointProblem& joint, const GrowingTrust& start) {
   return least;
 }
 
+/// The colour of the noise, where the model itself leaves no more than that of most of the decays: a trajectory that is lost leaves lines.
+std::vector<ChannelColour> noise_left_of_decays(JointProblem joint) {
+  if (has_colour(joint)) return {};  // it has been taken out
+  for (RunResidual& run : joint.runs()) run.set_aside(!is_decay(run));
+  return noise_colours_of_most(joint);
+}
+
 }  // namespace
 
 bool takes_small_steps(const JointProblem& joint) {
@@ -405,10 +414,13 @@ DecaysLeft fit_decays(JointProblem& joint, const std::string& id, bool from_here
         if (other->better_than(*best)) best = std::move(other);
       }
     constexpr double to_the_noise = 1.05, nearly = 1.5;  // trajectories that cross the corners for seconds have least chi-squares everywhere; few are the deepest
-    if (!(found.most_left < to_the_noise)) best->fit(GrowingTrust::trusted_levels);
-    if (found.most_left < to_the_noise || (found.left < nearly && best->left_as_trusted() > followed)) {
+    std::vector<ChannelColour> noise;
+    if (!(found.most_left < to_the_noise) && found.left < nearly_explained) noise = noise_left_of_decays(found.joint);
+    const bool to_its_noise = found.most_left < to_the_noise || !noise.empty();
+    if (!to_its_noise) best->fit(GrowingTrust::trusted_levels);
+    if (to_its_noise || (found.left < nearly && best->left_as_trusted() > followed)) {
       joint = std::move(found.joint);
-      return {found.left, true};
+      return {found.left, true, std::move(noise)};
     }
     joint = best->joint();
     std::size_t d = 0;

@@ -1,7 +1,9 @@
 #pragma once
 #include <string>
+#include <vector>
 
 #include "fit/likelihood/joint_problem.h"
+#include "fit/likelihood/noise_colour.h"
 
 namespace unrig {
 
@@ -18,6 +20,7 @@ bool takes_small_steps(const JointProblem& joint);
 struct DecaysLeft {
   double chi2 = 0;       ///< over the degrees of freedom, at the noise levels themselves
   bool exactly = false;  ///< by the model itself; else chi2 is J over the samples of laws trusted to within 2.5 % of the force that is missed, infinite if not worth it
+  std::vector<ChannelColour> noise = {};  ///< its colour, where the model itself leaves no more than that of most decays; empty: white, or more than noise
 };
 
 /// Fits the runs of `joint` whose motion is not estimated, with the nonlinear effect `id` at work, and leaves what it finds in `joint`. With a strong nonlinearity
@@ -25,7 +28,7 @@ struct DecaysLeft {
 /// laws that are trusted more and more (fit/search/law_smoother.h), from the present size of the effect (its first parameter) and from the first values of parameters that
 /// have gone astray; from there theta and the linear unknowns c are searched side by side with the model itself. Where that does not follow the decays, once more from
 /// a smaller and a larger size. A large trajectory that crosses the corners of a law for seconds tells errors of theta from each other as little as chance does, and has least chi-squares
-/// everywhere: of the ways to a law that takes small steps the one that leaves least is kept, and where it leaves one of the decays above its noise, the law is asked what it leaves
+/// everywhere: of the ways to a law that takes small steps the one that leaves least is kept, and where it leaves one of the decays above its noise, which may have a colour, the law is asked what it leaves
 /// when it is trusted to within some per cent; that holds where it is the noise, or where the model itself leaves more than half as much again.
 /// `from_here`: the start is an estimate, other sizes are not tried; nor are they of an effect that acts in none of the decays.
 DecaysLeft fit_decays(JointProblem& joint, const std::string& id, bool from_here = false);

@@ -180,16 +180,31 @@ Trial fit_baseline(const FitProblem& problem) {
 
 namespace {
 
+using ColoursFor = std::function<RunResidual::Colours(const RunResidual&, const Eigen::VectorXd& theta)>;
+
 /// `colours_for`: those of each run that may have some.
-bool take_colours(Trial& trial, const std::vector<ChannelColour>& in_common, const std::function<RunResidual::Colours(const RunResidual&, const Eigen::VectorXd&)>& colours_for) {
-  if (in_common.empty()) return false;
-  JointProblem& joint = trial.arrival.joint;
+void set_colours(JointProblem& joint, const ColoursFor& colours_for) {
   for (std::size_t r = 0; r < joint.runs().size(); ++r) {
     RunResidual& run = joint.runs()[r];
     if (run.may_be_coloured() && !run.is_aside() && run.converter(0).step == 0) run.set_colours(joint.theta(r), colours_for(run, joint.theta(r)));
   }
-  fit_fully(trial, 2);
+}
+
+bool take_colours(Trial& trial, const std::vector<ChannelColour>& in_common, const ColoursFor& colours_for) {
+  if (in_common.empty()) return false;
+  set_colours(trial.arrival.joint, colours_for);
+  if (decays_decide(trial)) measure(trial);  // a fit of all runs together is dear there, and may lose its way
+  else fit_fully(trial, 2);
   return true;
+}
+
+/// As if the noise levels of the run were right.
+RunResidual::Colours in_size_of(const RunResidual& run, const std::vector<ChannelColour>& in_common) {
+  RunResidual::Colours colours(run.channels().size());
+  for (std::size_t c = 0; c < colours.size(); ++c)
+    for (const ChannelColour& known : in_common)
+      if (known.channel == run.channels()[c]) colours[c] = known.colour.times(run.noise(c));
+  return colours;
 }
 
 }  // namespace
@@ -201,13 +216,7 @@ bool take_noise_colour(Trial& trial) {
 
 bool take_noise_colour_of_most(Trial& trial) {
   const std::vector<ChannelColour> in_common = noise_colours_of_most(trial.arrival.joint);
-  return take_colours(trial, in_common, [&](const RunResidual& run, const Eigen::VectorXd&) {
-    RunResidual::Colours colours(run.channels().size());
-    for (std::size_t c = 0; c < colours.size(); ++c)
-      for (const ChannelColour& known : in_common)
-        if (known.channel == run.channels()[c]) colours[c] = known.colour.times(run.noise(c));
-    return colours;
-  });
+  return take_colours(trial, in_common, [&](const RunResidual& run, const Eigen::VectorXd&) { return in_size_of(run, in_common); });
 }
 
 bool has_colour(const JointProblem& joint) {
@@ -385,6 +394,21 @@ double left_of_decays(const Trial& trial) {
 
 bool decays_decide(const Trial& trial) { return takes_small_steps(trial.arrival.joint) && has_decays(trial.arrival.joint); }
 
+namespace {
+
+/// A search in the noise that the decays are left with, where that has a colour: how far a run is followed is told in units of it. The noise is as it was behind the search.
+void in_noise_of_decays(Trial& trial, const std::function<void()>& search) {
+  JointProblem& joint = trial.arrival.joint;
+  const std::vector<ChannelColour> known = trial.decays.noise;
+  if (known.empty()) return search();
+  const std::vector<RunResidual> before = joint.runs();
+  set_colours(joint, [&](const RunResidual& run, const Eigen::VectorXd& theta) { return run.motion().unknowns() > 0 ? in_size_of(run, known) : run.colours(theta, known); });
+  search();
+  for (std::size_t r = 0; r < before.size(); ++r) joint.runs()[r].keep_noise_of(before[r]);
+}
+
+}  // namespace
+
 bool fit_decays_first(Trial& trial, const Trial& base, bool from_here) {
   JointProblem& joint = trial.arrival.joint;
   constexpr double worth_it = 0.5;
@@ -398,9 +422,11 @@ bool fit_decays_first(Trial& trial, const Trial& base, bool from_here) {
   measure(trial);
   if (helps) {
     constexpr double astray = 10;
-    in_parallel(joint.runs().size(), [&](std::size_t r) {  // c of the others still is the baseline's
-      RunResidual& run = joint.runs()[r];
-      if (run.takes_small_steps(joint.theta(r)) || trial.variance[r] > astray) find_motion(run, joint.theta(r));
+    in_noise_of_decays(trial, [&] {
+      in_parallel(joint.runs().size(), [&](std::size_t r) {  // c of the others still is the baseline's
+        RunResidual& run = joint.runs()[r];
+        if (run.takes_small_steps(joint.theta(r)) || trial.variance[r] > astray) find_motion(run, joint.theta(r));
+      });
     });
     if (!takes_small_steps(joint) && trial.decays.chi2 < nearly_explained) fit_own_parameters(joint, astray);
   }
@@ -417,12 +443,16 @@ void follow_motions(Trial& trial) {
   const auto moves = [](const RunResidual& run) { return run.motion().unknowns() > 0; };
   if (std::none_of(joint.runs().begin(), joint.runs().end(), moves)) return measure(trial);
   for (RunResidual& run : joint.runs()) run.set_aside(!trial.decays.exactly && !moves(run));
-  fit_own_parameters(joint);
-  temper(joint);
-  measure(trial);
-  Trial together = trial;
-  fit_fully(together, 2);
-  if (together.excess() < trial.excess()) trial = std::move(together);
+  in_noise_of_decays(trial, [&] {
+    fit_own_parameters(joint);
+    temper(joint);
+    measure(trial);
+    if (leaves_nothing(trial)) return;
+    Trial together = trial;
+    fit_fully(together, 2);
+    if (together.excess() < trial.excess()) trial = std::move(together);
+  });
+  if (!trial.decays.noise.empty()) measure(trial);
 }
 
 }  // namespace

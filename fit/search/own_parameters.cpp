@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "core/numerics/in_parallel.h"
+#include "fit/likelihood/explained.h"
 #include "fit/search/find_motion.h"
 #include "fit/search/left_of_runs.h"
 
@@ -19,11 +20,12 @@ void search_alone(JointProblem& alone) {
   options.tolerance = 1e-2;
   options.precision = 0.5;
   options.most_evaluations = 12;
-  options.enough = to_the_noise;
-  const double enough = to_the_noise * static_cast<double>(alone.runs().front().degrees_of_freedom());
+  const Eigen::Index freedom = alone.runs().front().degrees_of_freedom();
+  options.enough = alone.runs().front().colour(0) ? most_of_noise(freedom) : to_the_noise;  // the size of a colour is that of other runs
+  const double enough = options.enough * static_cast<double>(freedom);
   constexpr int rounds = 2;
-  for (int round = 0; round < rounds; ++round) {
-    alone.solve(options);
+  for (int round = 0; round < rounds && !(alone.chi2() < enough); ++round) {
+    if (JointProblem tried = alone; tried.solve(options), tried.chi2() < alone.chi2()) alone = std::move(tried);  // under a law with corners a search for c may lose its way at the next theta
     if (alone.chi2() < enough) break;
     JointProblem other = alone;
     if (RunResidual& run = other.runs().front(); run.takes_small_steps(other.theta(0))) find_motion(run, other.theta(0), true);

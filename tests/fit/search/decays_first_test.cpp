@@ -11,6 +11,7 @@
 #include "core/numerics/in_parallel.h"
 #include "fit/search/arrival.h"
 #include "fit/diagnose/diagnose.h"
+#include "fit/trial/laboratory.h"
 #include "fit/trial/trial_campaign.h"
 #include "fit/search/effect_search.h"
 #include "fit/fit.h"
@@ -64,10 +65,10 @@ struct Hidden {
   Trial baseline;
 };
 
-Hidden hide(const std::string& effect, unsigned seed, unsigned trial) {
+Hidden hide(const std::string& effect, unsigned seed, unsigned trial, const Laboratory& laboratory = ideal_laboratory()) {
   std::seed_seq sequence{seed, trial};
   std::mt19937_64 random(sequence);
-  const TrialCampaign campaign = draw_campaign(read_rig(test::null_campaign("rig.toml")), {effect}, draw_runs(0.03, random), ideal_laboratory(), random);
+  const TrialCampaign campaign = draw_campaign(read_rig(test::null_campaign("rig.toml")), {effect}, draw_runs(0.03, random), laboratory, random);
   const auto problem = std::make_shared<FitProblem>();
   problem->rig = campaign.rig;
   problem->runs = campaign.runs;
@@ -94,6 +95,21 @@ TEST(DecaysFirst, ASmallGapIsFollowedToTheNoise) {
   EXPECT_TRUE(left.exactly);
   EXPECT_LT(left.chi2, 1.15) << "what counts as explained";
   EXPECT_NEAR(unknowns_of(trial.arrival.joint, "freeplay").front()->value / hidden.parameters.front(), 1, 0.02) << "0.011 measured; its whole trace is ten times the noise at most";
+}
+
+TEST(DecaysFirst, AGapIsFollowedToNoiseOfAColour) {
+  Laboratory pink;
+  pink.noise = NoiseKind::pink;
+  pink.share = 0.7;
+  const Hidden hidden = hide("freeplay", 702, 20, pink);
+  Trial trial = prepare(*hidden.problem, hidden.baseline, {"freeplay"});
+  ASSERT_TRUE(fit_decays_first(trial, hidden.baseline));
+  EXPECT_TRUE(trial.decays.exactly);
+  EXPECT_GT(trial.decays.chi2, 1.5) << "otherwise this campaign tests nothing of the colour";
+  EXPECT_FALSE(trial.decays.noise.empty());
+  follow_further(trial, INFINITY);
+  EXPECT_FALSE(has_colour(trial.arrival.joint)) << "the noise is as it was behind the search, for evidence is told in one noise";
+  EXPECT_NEAR(unknowns_of(trial.arrival.joint, "freeplay").front()->value / hidden.parameters.front(), 1, 0.04) << "as in white noise";
 }
 
 TEST(DecaysFirst, WhatARunHasToItselfStaysWhenTheRigGoesBack) {
