@@ -437,7 +437,7 @@ bool fit_decays_first(Trial& trial, const Trial& base, bool from_here) {
 
 namespace {
 
-/// The runs whose motion is estimated, once the decays have told theta under a law with corners: each by itself, then all of them. Decays that are not followed exactly are set aside.
+/// The runs whose motion is estimated, once the decays have told theta under a law with corners: each by itself, for a fit of all of them together loses its way. Decays that are not followed exactly are set aside.
 void follow_motions(Trial& trial) {
   JointProblem& joint = trial.arrival.joint;
   const auto moves = [](const RunResidual& run) { return run.motion().unknowns() > 0; };
@@ -446,13 +446,8 @@ void follow_motions(Trial& trial) {
   in_noise_of_decays(trial, [&] {
     fit_own_parameters(joint);
     temper(joint);
-    measure(trial);
-    if (leaves_nothing(trial)) return;
-    Trial together = trial;
-    fit_fully(together, 2);
-    if (together.excess() < trial.excess()) trial = std::move(together);
   });
-  if (!trial.decays.noise.empty()) measure(trial);
+  measure(trial);
 }
 
 }  // namespace
