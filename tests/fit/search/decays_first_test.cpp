@@ -180,6 +180,21 @@ TEST(DecaysFirst, AFitWithAStrongSpringNamedArrives) {
 }
 
 /// What is not measured would rank before all that is.
+TEST(DecaysFirst, StaticDisplacementsThatNoRunAsksForAreLeftOut) {
+  const Hidden hidden = hide("cubic-stiffness", 8, 1);  // hidden without any
+  Trial trial = prepare(*hidden.problem, hidden.baseline, {"cubic-stiffness"});
+  ASSERT_TRUE(follow_nonlinear(*hidden.problem, trial, hidden.baseline, INFINITY));
+  ASSERT_TRUE(leaves_nothing(trial)) << trial.reduced_chi2();
+  for (Unknown* u : unknowns_of(trial.arrival.joint, "cubic-stiffness")) u->held = false;
+  settle(trial);
+  Trial fewer = trial;
+  leave_out_terms(fewer);
+  EXPECT_LT(bic_difference(fewer, trial), -10) << "three steps have one each, of which the logarithm of all samples counts";
+  const std::vector<Unknown*> own = unknowns_of(fewer.arrival.joint, "cubic-stiffness");
+  ASSERT_EQ(own.size(), 4u);
+  for (const Unknown* u : own) EXPECT_EQ(u->held, u->run >= 0) << fewer.arrival.joint.name(*u);
+}
+
 TEST(DecaysFirst, DecaysAloneUnderAGapAreMeasured) {
   FitProblem problem;
   problem.rig = read_rig(test::null_campaign("rig.toml"));
