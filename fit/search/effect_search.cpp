@@ -443,10 +443,8 @@ void follow_motions(Trial& trial) {
   const auto moves = [](const RunResidual& run) { return run.motion().unknowns() > 0; };
   if (std::none_of(joint.runs().begin(), joint.runs().end(), moves)) return measure(trial);
   for (RunResidual& run : joint.runs()) run.set_aside(!trial.decays.exactly && !moves(run));
-  in_noise_of_decays(trial, [&] {
-    fit_own_parameters(joint);
-    temper(joint);
-  });
+  in_noise_of_decays(trial, [&] { fit_own_parameters(joint); });
+  temper(joint);
   measure(trial);
 }
 
