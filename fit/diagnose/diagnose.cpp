@@ -26,6 +26,7 @@
 #include "fit/laws/law_search.h"
 #include "fit/search/decays_first.h"
 #include "fit/search/effect_search.h"
+#include "fit/search/noise_of_trial.h"
 #include "fit/fit_description.h"
 #include "fit/givens/inexact_rig.h"
 #include "fit/likelihood/run_order.h"
@@ -352,7 +353,7 @@ Diagnosis diagnose_in_order(const DiagnoseProblem& problem, bool numbers_known) 
     coloured = anew = true;
   };
   const auto noise_or_rig = [&](const Trial& set) {
-    if (Trial there = set; !coloured && (explained_by_noise(there) || in_noise_of_most(there))) {
+    if (Trial there = set; !coloured && explained_by_noise(there)) {
       begin_anew(std::move(there));
       return true;
     }
@@ -389,7 +390,7 @@ Diagnosis diagnose_in_order(const DiagnoseProblem& problem, bool numbers_known) 
       laws_tried = std::move(searched.tried);
       asked_forms = searched.forms;
       if (none_leaves_nothing(laws_tried) && !laws_tried.empty() && !coloured)
-        if (Trial in_its_noise = laws_tried.front(); explained_by_noise(in_its_noise) || in_noise_of_most(in_its_noise)) {  // all is held against each other anew
+        if (Trial in_its_noise = laws_tried.front(); explained_by_noise(in_its_noise)) {  // all is held against each other anew
           take_noise_of(baseline, in_its_noise);
           coloured = true;
           d.mismatch = locate_mismatch(baseline.arrival.joint);

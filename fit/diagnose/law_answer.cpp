@@ -8,6 +8,7 @@
 #include "core/law/law_effect.h"
 #include "core/numerics/in_parallel.h"
 #include "fit/fit_description.h"
+#include "fit/search/noise_of_trial.h"
 
 namespace unrig {
 namespace {

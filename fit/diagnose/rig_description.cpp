@@ -12,6 +12,7 @@
 #include "core/rig/default_errors.h"
 #include "fit/diagnose/selection.h"
 #include "fit/givens/inexact_rig.h"
+#include "fit/search/noise_of_trial.h"
 
 namespace unrig {
 namespace {

@@ -14,6 +14,7 @@
 #include "core/numerics/time_limit.h"
 #include "fit/search/decays_first.h"
 #include "fit/diagnose/mismatch.h"
+#include "fit/search/noise_of_trial.h"
 
 namespace unrig {
 namespace {

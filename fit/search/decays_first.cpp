@@ -13,6 +13,7 @@
 #include "fit/search/arrival.h"
 #include "fit/search/effect_search.h"
 #include "fit/search/law_smoother.h"
+#include "fit/search/noise_of_trial.h"
 #include "fit/solver/least_squares.h"
 
 namespace unrig {

@@ -59,15 +59,6 @@ double deviance_difference(const Trial& a, const Trial& b);
 /// The best fit with nothing missing.
 Trial fit_baseline(const FitProblem& problem);
 
-/// Gives each run noise of the colour that is left of all of them at rest (noise_colours), in its own size, and fits again. False, and nothing done, where that is white.
-bool take_noise_colour(Trial& trial);
-/// The same with the colour that is left of most of them (noise_colours_of_most), in the size that it has there beside white noise: a mismatch in the others makes it no larger.
-bool take_noise_colour_of_most(Trial& trial);
-/// Whether the noise of any run has a colour.
-bool has_colour(const JointProblem& joint);
-/// Gives the runs of `trial` the noise of those of `other`, and fits again, where that has a colour.
-void take_noise_of(Trial& trial, const Trial& other);
-
 /// `effects`, those of base and one or more: where their search begins, and as score what one linear step from `base` would remove. `screening`: of base.
 Trial screened(const FitProblem& problem, const Screening& screening, const Trial& base, const std::vector<std::string>& effects);
 

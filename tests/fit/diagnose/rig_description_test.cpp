@@ -14,6 +14,7 @@
 #include "fit/diagnose/diagnosis_files.h"
 #include "fit/diagnose/selection.h"
 #include "tests/support/sample_data.h"
+#include "fit/search/noise_of_trial.h"
 
 namespace unrig {
 namespace {

@@ -14,6 +14,7 @@
 #include "fit/trial/laboratory.h"
 #include "fit/trial/trial_campaign.h"
 #include "fit/search/effect_search.h"
+#include "fit/search/noise_of_trial.h"
 #include "fit/fit.h"
 #include "tests/support/sample_data.h"
 
