@@ -398,7 +398,15 @@ Diagnosis diagnose_in_order(const DiagnoseProblem& problem, bool numbers_known) 
           found = look_at(problem, files, baseline, files, baseline, 0);
           laws_tried = in_noise_of(in_its_noise, laws_tried, baseline, *selection);
         }
-      if (!none_leaves_nothing(laws_tried)) laws = choose_law(problem, fit_problem, files, baseline, laws_tried, *selection, found);
+      if (none_leaves_nothing(laws_tried)) return;
+      laws = choose_law(problem, fit_problem, files, baseline, laws_tried, *selection, found);
+      if (!laws) return;
+      // No effect but laws was fitted so far: one with fewer parameters may take as much.
+      Trial better = selection->challenged(found.best);
+      if (same_set(better.effects, found.best.effects)) return;
+      laws.reset();
+      found = look_at(problem, files, baseline, files, baseline, 0);
+      laws_tried.insert(laws_tried.begin(), std::move(better));
     });
   if (!laws) fit_problem.rig.laws.clear();
   // Laws of the list that take most of the mismatch are where the search among all effects goes on from.

@@ -38,6 +38,9 @@ class Selection {
   /// `other` explains everything without an effect: a law that promises less than half of what it takes, or a signal that promises less than a quarter, does not come out ahead, and is not fitted.
   void hold_against(const Trial& other);
 
+  /// `best`, or what explains the runs better with another effect of the list in place of a member: each is challenged by those that were not fitted and promise half of what it takes.
+  Trial challenged(Trial best);
+
   /// Effects as they were screened beside the baseline elsewhere, each by itself.
   void know(std::vector<Trial> screened) { screened_ = std::move(screened); }
 
@@ -63,7 +66,6 @@ class Selection {
   Trial without_superfluous(Trial trial);
   void try_with_all_modes(std::vector<Trial>& tried);
   std::vector<Trial> rivals(const Trial& best, const std::string& member);
-  Trial challenged(Trial best);
   bool is_fitted(const std::vector<std::string>& set) const;
   bool takes_too_little(const Trial& screened) const;
   void tell(const std::string& what) const {

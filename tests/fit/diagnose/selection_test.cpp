@@ -137,6 +137,15 @@ TEST(Selection, TheFirstThatExplainsTheRunsIsChallengedFromWhereItEnds) {
   EXPECT_LT(tried(drag, {"tank-wave"})->reduced_chi2, explained);
 }
 
+/// A surge takes a tone too, with more parameters in each run, and promises more to first order: it is a law, and those are looked for first.
+TEST(Selection, ALawIsChallengedByForcesThatAreNone) {
+  const TrialCampaign campaign = pair(3001, 7, {"vortex-shedding"}, true);
+  ASSERT_GT(campaign.sizes[0], 1);
+  const Diagnosis d = verdict_on(campaign, {});
+  EXPECT_THAT(found_in(d), testing::ElementsAre("vortex-shedding"));
+  EXPECT_TRUE(tried(d, {"speed-surge"})) << "otherwise this campaign tests nothing of the challenge";
+}
+
 /// A friction of 544 times the noise, and hum below it: what following the friction in whole samples leaves had got a slower build-up and a separation, until finer steps left less and the rest no name.
 TEST(Selection, WhatIsLeftOfALawIsGivenNoNameThatDoesNotExplainIt) {
   const TrialCampaign campaign = pair(3602, 19, {"coulomb-friction", "mains-hum"}, true);
