@@ -99,7 +99,7 @@ void check(const Rig& rig) {
 
 void scale_column(Run& run, const char* name, double factor) {
   for (Channel& channel : run.channels)
-    if (channel.name == name) channel.value *= factor;
+    if (channel.name == name) channel.value *= factor, channel.factor *= factor;
 }
 
 /// A group of numbers that one relative error moves.

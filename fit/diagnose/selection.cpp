@@ -178,8 +178,8 @@ Strings Selection::candidates(const Strings& at_work, const Strings& hopeless) c
   return ids;
 }
 
-/// Beside what else explains everything. Signals move the rig's parameters, and may take some times what they promise.
-bool Selection::takes_too_little(const Trial& screened) const { return screened.score < (brings_a_law(screened) ? half_of_it : quarter_of_it) * taken_; }
+/// Beside what else explains everything. Effects move the rig's parameters and their own, and may take some times what they promise.
+bool Selection::takes_too_little(const Trial& screened) const { return screened.score < quarter_of_it * taken_; }
 
 /// Each of `ids` beside `base`.
 std::vector<std::unique_ptr<Trial>> Selection::screened_beside(const Trial& base, const Strings& ids) {

@@ -35,7 +35,7 @@ class Selection {
   /// `baseline` itself where no mismatch is found or no effect is worth it. It ends, too, with a set that leaves something where `enough` says so. `begun`: a set that was found elsewhere, from which it goes on.
   Trial best_set(const std::function<bool(const Trial&)>& enough = {}, const Trial* begun = nullptr);
 
-  /// `other` explains everything without an effect: a law that promises less than half of what it takes, or a signal that promises less than a quarter, does not come out ahead, and is not fitted.
+  /// `other` explains everything without an effect: what promises less than a quarter of what it takes does not come out ahead, and is not fitted.
   void hold_against(const Trial& other);
 
   /// `best`, or what explains the runs better with another effect of the list in place of a member: each is challenged by those that were not fitted and promise half of what it takes.

@@ -282,6 +282,18 @@ void RunResidual::keep_noise_of(const RunResidual& other) {
   angle_weight_ = other.angle_weight_;
   spikes_ = other.spikes_;
   tempered_ = other.tempered_;
+  bool other_colours = false;
+  for (std::size_t c = 0; c < channels_.size(); ++c) {  // a number is as noisy as it was; what it stands for may be calibrated anew
+    const double size = run_->find(channels_[c])->factor / other.run_->find(channels_[c])->factor;
+    if (size == 1) continue;
+    sigma_[c] *= size;
+    converter_[c].step *= size;
+    weight_.col(static_cast<Index>(c)) /= size;
+    if (!colour(c)) continue;
+    colour_[c] = colour_[c]->times(size);
+    other_colours = true;
+  }
+  if (other_colours) take_colour(*this);
   weights_changed();
 }
 

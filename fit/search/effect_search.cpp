@@ -139,10 +139,10 @@ double Trial::excess() const {
 
 namespace {
 
-/// Logarithm of what a run's variance is told in units of, a square of its noise; of its innovations where a force wanders.
+/// Logarithm of what a run's variance is told in units of, a square of its noise in what its file counts in, however that is calibrated; of its innovations where a force wanders.
 double log_unit(const RunResidual& run) {
   double sum = 0;
-  for (std::size_t c = 0; c < run.channels().size(); ++c) sum += 2 * std::log(run.sigma(c));
+  for (std::size_t c = 0; c < run.channels().size(); ++c) sum += 2 * std::log(run.sigma(c) / run.run().find(run.channels()[c])->factor);
   return sum / static_cast<double>(run.channels().size());
 }
 
