@@ -74,6 +74,7 @@ struct LinearSystem {
   Eigen::Index lags = 0;
   Eigen::Index motion = -1;  ///< index of the state p, or -1
   std::vector<Eigen::Index> settling;   ///< further states that are at rest where the rig is (a filter's)
+  std::vector<Eigen::Index> filters;    ///< of them those of filters behind the reading of the first output
   std::vector<Eigen::Index> exogenous;  ///< further states whose initial value is unknown in every run (a signal's)
   std::vector<std::vector<Eigen::Index>> parts;  ///< groups of exogenous states that a signal may do without in a run (a harmonic)
   std::vector<std::string> outputs;

@@ -139,6 +139,7 @@ void append_gauge_filter(LinearSystem& system, Index row, const GaugeFilter& fil
   put(system.C, n, DualMatrix(filter.h));
   if (inputs > 0) put(system.D, 0, filter.direct * bridge_inputs);
   for (Index i = 0; i < k; ++i) system.settling.push_back(n + i);
+  if (row == 0) system.filters.insert(system.filters.end(), system.settling.end() - k, system.settling.end());
 }
 
 }  // namespace unrig

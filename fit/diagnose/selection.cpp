@@ -179,7 +179,7 @@ Strings Selection::candidates(const Strings& at_work, const Strings& hopeless) c
 }
 
 /// Beside what else explains everything. Effects move the rig's parameters and their own, and may take some times what they promise.
-bool Selection::takes_too_little(const Trial& screened) const { return screened.score < quarter_of_it * taken_; }
+bool Selection::takes_too_little(const Trial& screened) const { return taken_ > 0 && screened.score < quarter_of_it * taken_; }
 
 /// Each of `ids` beside `base`.
 std::vector<std::unique_ptr<Trial>> Selection::screened_beside(const Trial& base, const Strings& ids) {
@@ -408,7 +408,10 @@ Trial Selection::best_set(const std::function<bool(const Trial&)>& enough, const
   Trial best = begun ? *begun : baseline_;
   std::optional<Trial> sufficient;  // a law that is followed all but exactly: what it leaves has a name only where that leaves nothing
   try {
-    if (begun) best = settled(without_superfluous(best));
+    if (begun) {
+      ranking_.push_back({best.effects, best.reduced_chi2(), bic_difference(best, baseline_), 0, 0});
+      best = settled(without_superfluous(best));
+    }
     if (begun && enough && what_remains(best).found && enough(best)) return best;
     grow(best, enough, sufficient);
   } catch (const OutOfTime&) {

@@ -90,7 +90,7 @@ void measure(Trial& trial) {
     trial.samples.push_back(left[r].independent);
     trial.angle_variance.push_back(left[r].angle_variance);
     trial.angle_samples.push_back(left[r].angle_samples);
-    trial.variables += static_cast<int>(left[r].unknowns);
+    trial.variables += left[r].unknowns;
   }
   for (const Unknown& u : joint.unknowns()) trial.variables += u.held ? 0 : 1;
 }

@@ -19,7 +19,7 @@ struct Trial {
   std::vector<double> variance = {};   ///< per run: residual power over noise power
   std::vector<double> samples = {};    ///< per run: as many of them as the residual's colour leaves independent
   std::vector<double> angle_variance = {}, angle_samples = {};  ///< the same of the angle, where the motion is estimated; no samples elsewhere
-  int variables = 0;
+  double variables = 0;           ///< each as what it costs the evidence over the logarithm of all samples: 1, or what a run tells of less (left_of_runs)
   DecaysLeft decays = {INFINITY, true};  ///< what fit_decays left of them; infinite: not asked
   bool ruled_out = false;         ///< by the free decays: the other runs were not searched
   bool is_settled = false;        ///< at its least chi-square, further than a search among many goes (settle)

@@ -1,5 +1,6 @@
 #include "fit/search/left_of_runs.h"
 
+#include <Eigen/LU>
 #include <Eigen/QR>
 #include <Eigen/SVD>
 #include <algorithm>
@@ -46,23 +47,49 @@ std::vector<Index> places_of(const RunResidual& run, const std::vector<Index>& s
   return places;
 }
 
-/// Linear unknowns of a run that count. Of the states in which filters of the gauge start, those combinations that the readings know better than the swing of the reading itself tells: what a fast filter was
-/// in has died out before a sample shows it. Of the parts of a signal (LinearSystem::parts) those without which the evidence were less: what the others take of chi-square is left of the run instead.
+/// Standard deviations of where filters of the gauge start, before the readings are looked at: in their own states, one column for each term of what the channel showed before the record, a power series in t whose k-th
+/// coefficient is about swing omega^k / k!, of the reading's own swing and frequency. A reading t^k/k! leaves the filter x' = F x + g y in -F^-(k+1) g at t = 0.
+MatrixXd likely_starts(const LinearSystem& system, const VectorXd& reading, double dt) {
+  std::vector<Index> others;
+  for (Index i = 0; i < system.states(); ++i)
+    if (std::find(system.filters.begin(), system.filters.end(), i) == system.filters.end()) others.push_back(i);
+  // What goes into the filters is one reading, F = g c^T; at rest they show it as it is.
+  const MatrixXd F = system.A.value(system.filters, system.filters);
+  const Eigen::JacobiSVD<MatrixXd> into(system.A.value(system.filters, others), Eigen::ComputeThinU | Eigen::ComputeThinV);
+  const VectorXd along = into.matrixV().col(0), g = into.singularValues()[0] * into.matrixU().col(0);
+  const Eigen::PartialPivLU<MatrixXd> lu(F);
+  VectorXd start = -lu.solve(g);
+  const double shown = system.C.value.row(0)(system.filters).dot(start) + system.C.value.row(0)(others).dot(along);
+  const double swing = (reading.array() - reading.mean()).matrix().norm(), omega = (reading.tail(reading.size() - 1) - reading.head(reading.size() - 1)).norm() / (dt * swing);
+  start *= swing / std::sqrt(static_cast<double>(reading.size())) / shown;
+  MatrixXd starts(F.rows(), F.rows());
+  for (Index k = 0; k < F.rows(); ++k, start = omega / static_cast<double>(k) * lu.solve(start)) starts.col(k) = start;
+  return starts;
+}
+
+/// What linear unknowns of a run cost. Of the states in which filters of the gauge start, ln det(1 + P K), K what the readings say of them and P what is likely: Laplace's evidence, since what a fast filter was
+/// in has died out before many samples show it, and longer runs say no more of it (Berger, Bayarri and Pericchi, Econometric Reviews 33 (2014) 197). Of other states that settle, those combinations that the readings know
+/// better than the swing of the reading itself tells. Of the parts of a signal (LinearSystem::parts) those without which the evidence were less: what the others take of chi-square is left of the run instead.
 void count_unknowns(const RunResidual& run, const VectorXd& theta, const RunResidual::Prediction& p, double log_samples, LeftOfRun& left) {
-  left.unknowns = run.linear_unknowns();
+  left.unknowns = static_cast<double>(run.linear_unknowns());
   const LinearSystem system = run.model().system(run.conditions(), theta, run.channels());
-  if (const std::vector<Index> filters = places_of(run, system.settling); !filters.empty()) {
+  const auto told_of = [&](const std::vector<Index>& places, const MatrixXd& likely) { return VectorXd(Eigen::JacobiSVD<MatrixXd>(known_of(p, places).triangle * likely).singularValues()); };
+  if (const std::vector<Index> filters = places_of(run, system.filters); !filters.empty())
+    left.unknowns -= static_cast<double>(filters.size()) - told_of(filters, likely_starts(system, p.output.col(0), run.run().dt)).array().square().log1p().sum() / log_samples;
+  std::vector<Index> others = system.settling;
+  std::erase_if(others, [&](Index state) { return std::find(system.filters.begin(), system.filters.end(), state) != system.filters.end(); });
+  if (const std::vector<Index> settling = places_of(run, others); !settling.empty()) {
     const VectorXd reading = p.output.col(0).array() - p.output.col(0).mean();
+    const auto count = static_cast<Index>(settling.size());
     const double swing = reading.norm() / std::sqrt(static_cast<double>(reading.size()));
-    const VectorXd told = swing * Eigen::JacobiSVD<MatrixXd>(known_of(p, filters).triangle).singularValues();
-    left.unknowns -= static_cast<Index>(filters.size()) - (told.array() > 1).count();
+    left.unknowns -= static_cast<double>(count - (told_of(settling, swing * MatrixXd::Identity(count, count)).array() > 1).count());
   }
   for (const std::vector<Index>& part : system.parts) {  // each by itself: at frequencies apart they are all but orthogonal
     const std::vector<Index> places = places_of(run, part);
     const Known known = known_of(p, places);
     const double takes = (run.tempered() * (known.triangle * known.estimate)).squaredNorm(), costs = static_cast<double>(places.size()) * log_samples;
     if (takes > costs) continue;
-    left.unknowns -= static_cast<Index>(places.size());
+    left.unknowns -= static_cast<double>(places.size());
     left.variance += takes / left.samples;
   }
 }
@@ -92,13 +119,13 @@ std::vector<LeftOfRun> left_of_runs(const JointProblem& joint) {
     const auto every_sample = static_cast<double>(run.run().samples());
     if (run.is_aside()) {
       all[r] = {1, every_sample, every_sample};
-      all[r].unknowns = run.linear_unknowns();
+      all[r].unknowns = static_cast<double>(run.linear_unknowns());
       return;
     }
     const RunResidual::Prediction p = run.predict(joint.theta(r));
     if (!p.output.allFinite()) {
       all[r] = {run_away, every_sample, every_sample};
-      all[r].unknowns = run.linear_unknowns();
+      all[r].unknowns = static_cast<double>(run.linear_unknowns());
       return;
     }
     double power = 0;

@@ -14,7 +14,7 @@ struct LeftOfRun {
   double samples = 0;
   double independent = 0;  ///< of them, as the residual's colour says
   double angle_variance = 1, angle_samples = 0;  ///< the same of the angle, where the motion is estimated
-  Eigen::Index unknowns = 0;  ///< linear ones that its readings tell of
+  double unknowns = 0;  ///< linear ones that its readings tell of, each as what it costs the evidence over the logarithm of all samples
 };
 /// Of each run in turn.
 std::vector<LeftOfRun> left_of_runs(const JointProblem& joint);

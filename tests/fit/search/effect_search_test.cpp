@@ -8,9 +8,11 @@
 #include <memory>
 #include <numbers>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "tests/fit/one_mode.h"
+#include "tests/support/sample_data.h"
 
 namespace unrig {
 namespace {
@@ -25,7 +27,8 @@ struct Fitted {
   unrig::Run run;
   Trial trial;
 
-  explicit Fitted(const VectorXd& noise) : run(one_mode::decay("decay.csv", 5 * one_mode::free_response(samples, one_mode::hertz).col(0) + noise)), trial(fit_of(run)) {}
+  explicit Fitted(const VectorXd& noise) : Fitted(one_mode::decay("decay.csv", 5 * one_mode::free_response(samples, one_mode::hertz).col(0) + noise)) {}
+  explicit Fitted(unrig::Run of) : run(std::move(of)), trial(fit_of(run)) {}
 
  private:
   static Trial fit_of(const unrig::Run& run) {
@@ -76,6 +79,53 @@ TEST(Bic, TheAngleCountsOnlyWhereBothExplainTheRun) {
 }
 
 /// Of an autoregression of first order, n samples tell of its power what n (1 - r^2) / (1 + r^2) independent ones would (the mean of its spectrum, squared, over the mean of the square).
+/// A calibration that is ten per cent off makes readings and noise larger alike: the numbers of the file are as likely as they were.
+TEST(Bic, ACalibrationMakesNoEvidence) {
+  Fitted as_filed(one_mode::white_noise(samples, 1));
+  unrig::Run larger = as_filed.run;
+  for (Channel& c : larger.channels) c.value *= 1.1, c.factor *= 1.1;
+  Fitted moved(larger);
+  moved.trial.arrival.joint.runs().front().keep_noise_of(as_filed.trial.arrival.joint.runs().front());
+  EXPECT_NEAR(moved.trial.arrival.joint.chi2() / as_filed.trial.arrival.joint.chi2(), 1, 1e-9);
+  measure(as_filed.trial);
+  measure(moved.trial);
+  EXPECT_NEAR(deviance_difference(moved.trial, as_filed.trial), 0, 1e-6);
+}
+
+/// The gauge's channel of a pluck that is late, by each of these effects as late as by the other.
+double cost_of_starts(const unrig::Run& pluck, const std::string& id) {
+  FitProblem problem;
+  problem.rig = read_rig(test::null_campaign("rig.toml"));
+  problem.runs = {pluck};
+  const Trial base = fit_baseline(problem);
+  Trial late = prepare(problem, base, {id});
+  for (Unknown& u : late.arrival.joint.unknowns()) {
+    const std::string& name = late.arrival.joint.parameter(u).name;
+    constexpr double delay = 0.004, damping = 0.7;
+    if (name == "channel-delay.time") u.value = delay;
+    if (name == "gauge-lowpass.cutoff") u.value = damping / (std::numbers::pi * delay);  // whose phase falls by 2 zeta / w at first
+    if (name == "gauge-lowpass.damping_ratio") u.value = damping;
+  }
+  measure(late);
+  double unknowns = 0;
+  for (const Unknown& u : late.arrival.joint.unknowns()) unknowns += u.held ? 0 : 1;
+  for (const Unknown& u : base.arrival.joint.unknowns()) unknowns -= u.held ? 0 : 1;
+  return (late.variables - base.variables - unknowns) * std::log(static_cast<double>(pluck.samples()));
+}
+
+/// What a filter was in has died out within milliseconds: a longer record tells no more of it, and six states of a delay that is a few samples long cost what two of a filter as late do.
+TEST(Bic, WhereAFilterStartsCostsWhatIsLikelyOfIt) {
+  const unrig::Run pluck = read_run(test::null_campaign("dry_pluck.csv"));
+  unrig::Run half = pluck;
+  for (Channel& c : half.channels) c.value.conservativeResize(pluck.samples() / 2);
+  const double late = cost_of_starts(pluck, "channel-delay"), filtered = cost_of_starts(pluck, "gauge-lowpass");
+  constexpr double negligible = 3, level = 13;  // of twice the log likelihood; 2 ln of the swing over the noise, some 700, by which one sample tells the level that the filter was at
+  EXPECT_NEAR(cost_of_starts(half, "channel-delay"), late, negligible);
+  EXPECT_NEAR(cost_of_starts(half, "gauge-lowpass"), filtered, negligible);
+  EXPECT_NEAR(late, filtered, negligible);
+  EXPECT_GT(late, level);
+}
+
 TEST(Bic, ColouredSamplesCountAsFewerWhiteOnes) {
   for (const double r : {0.0, 0.5, 0.8}) {
     VectorXd noise = one_mode::white_noise(samples, 2);
