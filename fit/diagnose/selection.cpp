@@ -152,15 +152,15 @@ Selection::Selection(const DiagnoseProblem& problem, const FitProblem& fit_probl
   ranking_.push_back({{}, baseline.reduced_chi2(), 0, 0, 0});
 }
 
-/// In chi-square with the weights that the baseline gives its runs, as promises are told.
-void Selection::hold_against(const Trial& other) {
+/// Share of what `base` leaves that is gone with what all is held against, with the weights that `base` gives its runs, as promises are told; 0 where there is no such thing.
+double Selection::taken_beyond(const Trial& base) const {
   double left = 0, all = 0;
-  for (std::size_t r = 0; r < baseline_.variance.size(); ++r) {
-    const double weight = static_cast<double>(baseline_.arrival.joint.runs()[r].run().samples()) / std::max(1.0, baseline_.variance[r]);
-    left += weight * other.variance[r];
-    all += weight * baseline_.variance[r];
+  for (std::size_t r = 0; r < held_against_.size(); ++r) {
+    const double weight = static_cast<double>(base.arrival.joint.runs()[r].run().samples()) / std::max(1.0, base.variance[r]);
+    left += weight * held_against_[r];
+    all += weight * base.variance[r];
   }
-  taken_ = 1 - left / all;
+  return all > 0 ? std::max(0.0, 1 - left / all) : 0;
 }
 
 /// Effects that can act in at least one of the runs of this rig, are not at work yet, and not `hopeless`.
@@ -178,8 +178,11 @@ Strings Selection::candidates(const Strings& at_work, const Strings& hopeless) c
   return ids;
 }
 
-/// Beside what else explains everything. Effects move the rig's parameters and their own, and may take some times what they promise.
-bool Selection::takes_too_little(const Trial& screened) const { return taken_ > 0 && screened.score < quarter_of_it * taken_; }
+/// Beside what else explains everything. Signals move the rig's parameters, and may take some times what they promise.
+bool Selection::takes_too_little(const Trial& screened, const Trial& base) const {
+  const double wanted = (brings_a_law(screened) ? half_of_it : quarter_of_it) * taken_beyond(base);
+  return wanted > 0 && screened.score < wanted;
+}
 
 /// Each of `ids` beside `base`.
 std::vector<std::unique_ptr<Trial>> Selection::screened_beside(const Trial& base, const Strings& ids) {
@@ -213,7 +216,7 @@ Trials Selection::try_one_more(const Trial& base, const Strings& hopeless) {
     const bool promises = linear.size() + others.size() < most_refits && trial->score > quarter_of_it * best_score;
     const bool step_says_nothing = far && best_score < half_of_it && takes_small_steps(trial->arrival.joint);  // of corners that bend a trajectory
     if (brings_a_law(*trial) && !far && !may_be_seen(*trial, base)) continue;
-    if (is_first(base) && !promises_nothing && takes_too_little(*trial)) continue;
+    if (!promises_nothing && takes_too_little(*trial, base)) continue;
     if (prepared.size() <= few || promises_nothing || promises || step_says_nothing) (follows_law ? others : linear).push_back(std::move(*trial));
     else if (!follows_law) unpromising.push_back(std::move(*trial));
   }
@@ -290,7 +293,7 @@ Trials Selection::rivals(const Trial& best, const std::string& member) {
     if (is_fitted(set)) return;
     Trial trial = screened(fit_problem_, screening, others, set);
     if (brings_a_law(trial) && others.reduced_chi2() > nearly_explained) return;  // too large a mismatch for two laws to explain alike
-    if (fewer.empty() && takes_too_little(trial)) return;
+    if (takes_too_little(trial, others)) return;
     if (without - trial.promised_left > half_of_it * (without - with_it)) prepared[i] = std::move(trial);
   });
   Trials rivals;

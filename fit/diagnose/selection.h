@@ -35,8 +35,8 @@ class Selection {
   /// `baseline` itself where no mismatch is found or no effect is worth it. It ends, too, with a set that leaves something where `enough` says so. `begun`: a set that was found elsewhere, from which it goes on.
   Trial best_set(const std::function<bool(const Trial&)>& enough = {}, const Trial* begun = nullptr);
 
-  /// `other` explains everything without an effect: what promises less than a quarter of what it takes does not come out ahead, and is not fitted.
-  void hold_against(const Trial& other);
+  /// `other` explains everything without an effect: a law that promises less than half of what it takes beyond a set, or a signal that promises less than a quarter, does not come out ahead beside that, and is not fitted.
+  void hold_against(const Trial& other) { held_against_ = other.variance; }
 
   /// `best`, or what explains the runs better with another effect of the list in place of a member: each is challenged by those that were not fitted and promise half of what it takes.
   Trial challenged(Trial best);
@@ -67,7 +67,8 @@ class Selection {
   void try_with_all_modes(std::vector<Trial>& tried);
   std::vector<Trial> rivals(const Trial& best, const std::string& member);
   bool is_fitted(const std::vector<std::string>& set) const;
-  bool takes_too_little(const Trial& screened) const;
+  double taken_beyond(const Trial& base) const;
+  bool takes_too_little(const Trial& screened, const Trial& base) const;
   void tell(const std::string& what) const {
     if (problem_.progress) problem_.progress(what);
   }
@@ -79,7 +80,7 @@ class Selection {
   std::vector<Candidate> ranking_;
   std::vector<std::string> lines_;  // signals at frequencies known beforehand that were taken out first
   bool stopped_ = false;
-  double taken_ = 0;
+  std::vector<double> held_against_;  // per run: what that leaves
 };
 
 /// Probabilities of a ranking (the best first) once `named` is the answer: a set of lower BIC that is neither named nor `unrefuted` leaves something or predicts worse, and so explains nothing.

@@ -119,7 +119,7 @@ TEST(Bic, WhereAFilterStartsCostsWhatIsLikelyOfIt) {
   unrig::Run half = pluck;
   for (Channel& c : half.channels) c.value.conservativeResize(pluck.samples() / 2);
   const double late = cost_of_starts(pluck, "channel-delay"), filtered = cost_of_starts(pluck, "gauge-lowpass");
-  constexpr double negligible = 3, level = 13;  // of twice the log likelihood; 2 ln of the swing over the noise, some 700, by which one sample tells the level that the filter was at
+  constexpr double negligible = 3, level = 12;  // of twice the log likelihood; 2 ln of the swing over the noise, some 400, by which one sample tells the level that the filter was at
   EXPECT_NEAR(cost_of_starts(half, "channel-delay"), late, negligible);
   EXPECT_NEAR(cost_of_starts(half, "gauge-lowpass"), filtered, negligible);
   EXPECT_NEAR(late, filtered, negligible);
