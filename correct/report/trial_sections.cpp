@@ -83,6 +83,8 @@ void add_reliability(ReportPage& page, const json& reliability) {
     page.add_bars("Do stated probabilities hold?", "right names [%]", bars,
                   fmt::format("Of the campaigns in which something was named with such a probability, those in which that is just what was hidden. Lines: 95 % intervals (Wilson). Calibration error {}, Brier score {}.",
                               plain(number_of(reliability, "calibration_error"), 3), plain(number_of(reliability, "brier"), 3)));
+  if (const json explanations = reliability.value("explanations", json::object()); explanations.value("campaigns", 0) > 0)
+    page.add_text(fmt::format("The explanations that were given hold what was hidden in {} of {} campaigns, with {} of them on the mean.", explanations.value("hold", 0), explanations.value("campaigns", 0), plain(number_of(explanations, "members"), 3)));
 }
 
 void add_failures(ReportPage& page, const json& trials) {

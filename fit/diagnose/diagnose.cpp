@@ -20,6 +20,7 @@
 #include "fit/diagnose/exact_model.h"
 #include "fit/diagnose/explanation.h"
 #include "fit/diagnose/law_answer.h"
+#include "fit/diagnose/reliability.h"
 #include "fit/diagnose/rig_description.h"
 #include "fit/diagnose/search_limits.h"
 #include "fit/diagnose/selection.h"
@@ -484,6 +485,9 @@ Diagnosis diagnose_in_order(const DiagnoseProblem& problem, bool numbers_known) 
     for (MissingEffect& m : effects_of(found, fit_problem.rig, d)) set.push_back(std::move(m));
     if (laws && !problem.verdict_only) tell_laws(fit_problem, *laws, found, set, d);
   }
+  const double right = share_of_right(d);
+  for (MissingEffect& m : d.missing) m.probability *= right;
+  d.explanations = explanations_of(d);
   d.stopped = limits.are_reached();
   d.work = limits.work();
   d.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();

@@ -72,7 +72,7 @@ struct Candidate {
 
 struct MissingEffect {
   std::string effect;
-  double probability = 0;
+  double probability = 0;  ///< that it is missing: over the sets tried, times how often such a verdict is right (share_of_right); of one that is not named over the sets tried
   std::string equation, source;
   std::vector<FittedParameter> parameters;
   std::string advice = {};  ///< what to do about it; of the rig's description only
@@ -93,9 +93,18 @@ struct ImprovedRun {
   bool aside = false;  ///< had no part in the fit after (FittedRun::aside): the laws that it is judged by are trusted to within some per cent only
 };
 
+/// Effects that may be at work together and explain the runs, and with which probability (fit/diagnose/reliability.h).
+struct StatedExplanation {
+  std::vector<std::string> effects;  ///< none: nothing is missing
+  double probability = 0;
+};
+constexpr double explanations_hold = 0.95;  ///< probability that Diagnosis::explanations hold the truth
+constexpr const char* something_else = "something-else";  ///< the explanation that is none of the sets tried: on no list, or not followed
+
 struct Diagnosis {
   Mismatch mismatch;                   ///< of the best fit with nothing missing
   std::vector<MissingEffect> missing;  ///< the winner
+  std::vector<StatedExplanation> explanations;  ///< the fewest that hold the truth with `explanations_hold`, the most probable first
   std::vector<std::vector<std::string>> equivalent;  ///< sets that these runs cannot tell from the winner
   std::vector<std::optional<SeparatingRecording>> separated_by;  ///< and the recording that would, for each of them
   bool unexplained = false;            ///< a significant mismatch remains

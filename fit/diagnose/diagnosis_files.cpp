@@ -164,6 +164,22 @@ ordered_json effects_json(const std::vector<MissingEffect>& effects) {
   return list;
 }
 
+ordered_json explanations_json(const std::vector<StatedExplanation>& explanations) {
+  ordered_json list = ordered_json::array();
+  for (const StatedExplanation& e : explanations) list.push_back({{"effects", e.effects}, {"probability", number(e.probability)}});
+  return list;
+}
+
+/// "[[Explanations]] one of these with 0.95: mains-hum (0.93), something else (0.07)".
+std::string explanations_text(const std::vector<StatedExplanation>& explanations) {
+  std::vector<std::string> each;
+  for (const StatedExplanation& e : explanations) {
+    const bool other = e.effects == std::vector<std::string>{something_else};
+    each.push_back(fmt::format("{} ({:.3g})", e.effects.empty() ? "nothing missing" : other ? "something else" : set_name(e.effects), e.probability));
+  }
+  return fmt::format("[[Explanations]] one of these, with a probability of {}\n    {}\n", explanations_hold, fmt::join(each, "; "));
+}
+
 std::string law_words(const FoundLaw& found) {
   std::string text;
   for (const auto& [symbol, range] : found.law.learnt_on) text += fmt::format("    learnt where {}; beyond, it is a guess, which simulate and correct refuse\n", told(symbol, range));
@@ -175,7 +191,7 @@ std::string law_words(const FoundLaw& found) {
 std::string effects_text(const std::vector<MissingEffect>& effects) {
   std::string text;
   for (const MissingEffect& m : effects) {
-    text += fmt::format("[[{}]] probability {:.4f} among the sets tried\n    {}{}\n", told_id(m), m.probability, m.equation, m.source.empty() ? "" : "    (" + m.source + ")");
+    text += fmt::format("[[{}]] probability {:.4f}\n    {}{}\n", told_id(m), m.probability, m.equation, m.source.empty() ? "" : "    (" + m.source + ")");
     for (const FittedParameter& p : m.parameters) {
       if (is_rig_description(m)) {
         text += "    " + moved_number(p) + "\n";
@@ -230,6 +246,8 @@ std::string to_json(const Diagnosis& d) {
                        {"verdict", verdict(d)},
                        {"mismatch", mismatch_json(d.mismatch)},
                        {"missing", effects_json(d.missing)},
+                       {"explanations", explanations_json(d.explanations)},
+                       {"holds", explanations_hold},
                        {"equivalent", d.equivalent},
                        {"separated_by", separated},
                        {"unexplained", d.unexplained},
@@ -253,6 +271,7 @@ std::string report(const Diagnosis& d) {
   if (d.mismatch.found) text += fmt::format("[[Mismatch]] p = {:.2g}\n    {}\n", d.mismatch.p_value, d.mismatch.summary);
   text += effects_text(d.missing);
   for (std::size_t i = 0; i < d.equivalent.size(); ++i) text += "    " + cannot_tell(d.equivalent[i], d.separated_by[i]) + "\n";
+  text += explanations_text(d.explanations);
   if (d.unexplained) text += "[[Unexplained]]\n    " + d.remaining.summary + "\n";
   if (const std::string words = search_words(d); !words.empty()) text += "    " + words + "\n";
   if (d.stopped) text += fmt::format("[[Stopped]]\n    {}\n", stopped_words);

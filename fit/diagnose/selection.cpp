@@ -13,6 +13,7 @@
 #include "core/numerics/in_parallel.h"
 #include "core/numerics/time_limit.h"
 #include "fit/search/decays_first.h"
+#include "fit/search/lost_run.h"
 #include "fit/diagnose/mismatch.h"
 #include "fit/search/noise_of_trial.h"
 
@@ -383,7 +384,7 @@ void Selection::grow(Trial& best, const std::function<bool(const Trial&)>& enoug
   if (best.reduced_chi2() > twice_the_noise) take_known_lines(best);
   Strings hopeless;  // laws with which alone the fit is worse than without: from that far away they are not found, and are not tried again before half of the way is gone
   while (!stopped_ && best.effects.size() < most_effects && what_remains(best).found) {
-    best = in_finer_steps(best);
+    best = in_finer_steps(with_lost_runs_followed(best));
     if (!what_remains(best).found) break;
     if (decays_decide(best) && best.reduced_chi2() > twice_the_noise) break;  // trajectories that are not followed tell nothing of a second effect, in minutes each
     if (!sufficient && nonlinear(best) && best.excess() < (1 - enough_to_name) * baseline_.excess() && leaves_nothing(best)) sufficient = best;

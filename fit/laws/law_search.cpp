@@ -17,6 +17,7 @@
 #include "fit/laws/screen.h"
 #include "fit/search/decays_first.h"
 #include "fit/search/left_of_runs.h"
+#include "fit/search/lost_run.h"
 
 namespace unrig {
 namespace {
@@ -321,6 +322,7 @@ void LawSearch::settle_first(std::vector<Trial>& tried) {
   if (tried.empty() || tried.front().is_settled || !leaves_something_(tried.front()) || tried.front().reduced_chi2() > nearly_explained || decays_decide(tried.front()) || bic_difference(tried.front(), base_) >= 0) return;
   if (all_driven(tried.front().arrival.joint)) fit_from_first_guesses(problem_, tried.front());
   settle(tried.front());
+  tried.front() = with_lost_runs_followed(std::move(tried.front()));
   if (!is_explained(tried.front())) tried.front() = in_finer_steps(std::move(tried.front()));
   tried.front().is_settled = true;
 }

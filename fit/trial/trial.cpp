@@ -16,6 +16,7 @@
 #include "core/rig/fingerprint.h"
 #include "core/numerics/in_parallel.h"
 #include "fit/diagnose/diagnose.h"
+#include "fit/diagnose/reliability.h"
 #include "fit/trial/hidden_law.h"
 #include "fit/trial/trial_campaign.h"
 #include "fit/trial/trial_files.h"
@@ -127,7 +128,8 @@ void take_verdict(const Diagnosis& d, TrialOutcome& outcome) {
   outcome.work = d.work;
   outcome.stopped = d.stopped;
   for (const Candidate& c : d.ranking)
-    if (!outcome.found.empty() && name_of(c.effects) == name_of(outcome.found)) outcome.probability = c.probability;
+    if (!outcome.found.empty() && name_of(c.effects) == name_of(outcome.found)) outcome.probability = share_of_right(d) * c.probability;
+  for (const StatedExplanation& e : d.explanations) outcome.explanations.push_back(e.effects);
 }
 
 void try_effects(const TrialProblem& problem, const Strings& effects, std::mt19937_64& random, TrialOutcome& outcome) {
@@ -215,16 +217,33 @@ Reliability reliability_of(const std::vector<TrialOutcome>& outcomes) {
     bin.stated /= bin.campaigns;
     all.bins.push_back(bin);
   }
+  for (const TrialOutcome& o : outcomes) {
+    if (o.explanations.empty()) continue;
+    ++all.explained;
+    all.held += o.held() ? 1 : 0;
+    all.members += static_cast<double>(o.explanations.size());
+  }
+  if (all.explained > 0) all.members /= all.explained;
   if (all.campaigns > 0) all.calibration_error /= all.campaigns, all.brier /= all.campaigns;
   return all;
 }
 
 }  // namespace
 
-bool TrialOutcome::right() const {
-  Strings named = found;
-  if (!misread.empty()) std::erase(named, rig_description_id);
-  return failure.empty() && name_of(named) == name_of(hidden);
+namespace {
+
+/// Whether a set is exactly what was hidden; beside it, where files are misread, the rig's description may be.
+bool is_hidden(Strings set, const TrialOutcome& o) {
+  if (!o.misread.empty()) std::erase(set, rig_description_id);
+  return name_of(set) == name_of(o.hidden);
+}
+
+}  // namespace
+
+bool TrialOutcome::right() const { return failure.empty() && is_hidden(found, *this); }
+
+bool TrialOutcome::held() const {
+  return std::any_of(explanations.begin(), explanations.end(), [&](const Strings& set) { return set == Strings{something_else} || is_hidden(set, *this); });
 }
 
 bool TrialOutcome::false_name() const {

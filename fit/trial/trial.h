@@ -44,6 +44,7 @@ struct TrialOutcome {
   std::string noise;           ///< kind of the gauge's noise
   std::string misread;         ///< group of the numbers by which the files are off; empty: none
   std::optional<double> probability;  ///< that the diagnosis gives what it found; none where nothing is named
+  std::vector<std::vector<std::string>> explanations;  ///< effects of Diagnosis::explanations
   bool mismatch = false, unexplained = false;
   std::optional<LawOutcome> law;  ///< of a campaign with a law
   double seconds = 0, work = 0;  ///< that the diagnosis took, and Diagnosis::work
@@ -53,6 +54,7 @@ struct TrialOutcome {
   bool right() const;          ///< exactly what was hidden was found; beside it, where files are misread, the rig's description may be
   bool false_name() const;     ///< something was found that was not there
   bool among_equivalent() const;
+  bool held() const;           ///< what was hidden is among the explanations, or something else is
 };
 
 /// How often one effect was found.
@@ -73,6 +75,8 @@ struct Reliability {
   int campaigns = 0;
   double calibration_error = 0;  ///< mean over campaigns of how far a bin's share of right names is from the mean probability in it
   double brier = 0;              ///< mean square of probability less 1 for a right, 0 for a wrong name
+  int explained = 0, held = 0;   ///< campaigns that were diagnosed, and those of them of which the explanations hold the truth
+  double members = 0;            ///< explanations on the mean
 };
 
 struct TrialResult {

@@ -28,6 +28,7 @@ ordered_json json_of(const TrialOutcome& o, bool seconds) {
   one["noise"] = o.noise;
   one["misread"] = o.misread.empty() ? ordered_json(nullptr) : ordered_json(o.misread);
   one["probability"] = o.probability ? ordered_json(*o.probability) : ordered_json(nullptr);
+  one["explanations"] = o.explanations;
   if (o.law) one["law"] = json_of(*o.law);
   one["work"] = o.work;
   if (o.stopped) one["stopped"] = true;
@@ -50,6 +51,7 @@ TrialOutcome outcome_of(const ordered_json& json) {
   json.at("noise").get_to(o.noise);
   if (const ordered_json& misread = json.at("misread"); !misread.is_null()) misread.get_to(o.misread);
   if (const ordered_json& probability = json.at("probability"); !probability.is_null()) o.probability = probability.get<double>();
+  o.explanations = json.value("explanations", o.explanations);
   if (json.contains("law")) o.law = law_outcome_of(json.at("law"));
   o.work = json.value("work", 0.0);
   o.stopped = json.value("stopped", false);
@@ -61,7 +63,7 @@ TrialOutcome outcome_of(const ordered_json& json) {
 ordered_json json_of(const Reliability& r) {
   ordered_json bins = ordered_json::array();
   for (const Reliability::Bin& b : r.bins) bins.push_back({{"from", b.from}, {"to", b.to}, {"campaigns", b.campaigns}, {"stated", b.stated}, {"right", b.right}});
-  return {{"campaigns", r.campaigns}, {"calibration_error", r.calibration_error}, {"brier", r.brier}, {"bins", bins}};
+  return {{"campaigns", r.campaigns}, {"calibration_error", r.calibration_error}, {"brier", r.brier}, {"bins", bins}, {"explanations", {{"campaigns", r.explained}, {"hold", r.held}, {"members", r.members}}}};
 }
 
 }  // namespace
@@ -94,6 +96,8 @@ std::string report(const TrialResult& r) {
     text += fmt::format("[[Stated probability -> share of right names]] calibration error {:.3f}, Brier score {:.3f}\n", r.reliability.calibration_error, r.reliability.brier);
     for (const Reliability::Bin& b : r.reliability.bins) text += fmt::format("    {:.2f} to {:.2f}: stated {:.3f}, right {} of {}\n", b.from, b.to, b.stated, b.right, b.campaigns);
   }
+  if (r.reliability.explained > 0)
+    text += fmt::format("[[Explanations]] hold what was hidden in {} of {} campaigns, with {:.2f} members on the mean\n", r.reliability.held, r.reliability.explained, r.reliability.members);
   if (r.laws) text += report(*r.laws);
   for (const TrialOutcome& o : r.outcomes)
     if (!o.failure.empty()) text += fmt::format("    failed with {} hidden: {}\n", name_of(o.hidden), o.failure);

@@ -145,7 +145,7 @@ TEST(Diagnose, ASignalThatLeavesAMismatchIsNotNamed) {
 TEST(DiagnosisFile, HasWhatTheFormatPromises) {
   const nlohmann::json json = nlohmann::json::parse(to_json(diagnose_campaign("null")));
   EXPECT_EQ(json["unrig"], "diagnosis");
-  for (const char* key : {"mismatch", "missing", "equivalent", "unexplained", "improvement"}) EXPECT_TRUE(json.contains(key)) << key;
+  for (const char* key : {"mismatch", "missing", "explanations", "holds", "equivalent", "unexplained", "improvement"}) EXPECT_TRUE(json.contains(key)) << key;
   for (const char* key : {"found", "p_value", "runs", "time", "frequency", "summary"}) EXPECT_TRUE(json["mismatch"].contains(key)) << key;
   for (const auto& run : json["improvement"]["runs"])
     for (const char* key : {"file", "heldout", "rms_before", "rms_after", "noise", "unit"}) EXPECT_TRUE(run.contains(key)) << key;

@@ -190,6 +190,23 @@ TEST(Trial, CountsWhetherStatedProbabilitiesHold) {
   EXPECT_EQ(result.wrong_names, 8);
 }
 
+/// Four campaigns: the right set alone, the right one among two, neither of two, and whatever else.
+TEST(Trial, CountsWhetherExplanationsHoldTheTruth) {
+  TrialResult result;
+  const std::vector<std::vector<std::vector<std::string>>> given{{{"tank-wave"}}, {{"gauge-drift"}, {"rig-description", "tank-wave"}}, {{"gauge-drift"}, {"tank-wave", "mains-hum"}}, {{"gauge-drift"}, {"something-else"}}};
+  for (const auto& explanations : given) {
+    TrialOutcome o;
+    o.hidden = {"tank-wave"};
+    o.misread = "speed";
+    o.explanations = explanations;
+    result.outcomes.push_back(o);
+  }
+  tally(result);
+  EXPECT_EQ(result.reliability.explained, 4);
+  EXPECT_EQ(result.reliability.held, 3);
+  EXPECT_NEAR(result.reliability.members, 7 / 4.0, 1e-12);
+}
+
 TEST(Trial, RefusesARigThatCannotBePitched) {
   TrialProblem problem;
   problem.rig.modal = {{2, 3, 0.01, 1000, "N"}};
