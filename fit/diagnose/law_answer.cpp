@@ -45,7 +45,10 @@ std::vector<Trial> in_noise_of(const Trial& first, const std::vector<Trial>& tri
   std::vector<Trial> anew;
   for (const Trial& t : tried)
     if (t.excess() <= 2 * tried.front().excess()) anew.push_back(t);
-  in_parallel(anew.size(), [&](std::size_t i) { take_noise_of(anew[i], first); });
+  in_parallel(anew.size(), [&](std::size_t i) {
+    take_noise_of(anew[i], first);
+    if (leaves_nothing(anew[i]) && !decays_decide(anew[i])) leave_out_terms(anew[i]);  // in white noise they left something
+  });
   std::stable_sort(anew.begin(), anew.end(), [](const Trial& a, const Trial& b) { return bic_difference(a, b) < 0; });
   for (const Trial& t : anew) selection.add({t.effects, t.reduced_chi2(), bic_difference(t, baseline), 0, 0});
   return anew;
