@@ -54,6 +54,8 @@ std::optional<Trial> followed_by_the_others(const Trial& trial, std::size_t lost
       const bool same_run = known.run < 0 ? u.run < 0 : u.run == static_cast<int>(others[static_cast<std::size_t>(known.run)]);
       if (same_run && known.parameter == u.parameter) u.value = known.value;
     }
+  joint.runs()[lost].temper(1);  // as it is to be followed
+  measure(again);                // a search may have ended with a step that was not taken: every run at this theta
   follow_from_afar(again, lost);
   fit_fully(again, 2);
   return again;

@@ -137,6 +137,14 @@ TEST(Selection, TheFirstThatExplainsTheRunsIsChallengedFromWhereItEnds) {
   EXPECT_LT(tried(drag, {"tank-wave"})->reduced_chi2, explained);
 }
 
+/// Friction of 5.4 N, sampled at 250 Hz (r4): the search for all runs together loses the wet decay, which it leaves with 15 times the power of its noise.
+TEST(Selection, ARunThatALawLostIsFollowedFromWhatTheOthersTell) {
+  UNRIG_NEEDS_SHARED("campaigns/open2");
+  const Diagnosis d = verdict_on(recorded("r4"), {"coulomb-friction"});
+  EXPECT_THAT(found_in(d), testing::ElementsAre("coulomb-friction"));
+  EXPECT_FALSE(d.unexplained) << d.remaining.summary;
+}
+
 /// A surge takes a tone too, with more parameters in each run, and promises more to first order: it is a law, and those are looked for first.
 TEST(Selection, ALawIsChallengedByForcesThatAreNone) {
   const TrialCampaign campaign = pair(3001, 7, {"vortex-shedding"}, true);
