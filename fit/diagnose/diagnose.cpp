@@ -240,12 +240,25 @@ MissingEffect missing_description(const RigDescription& description, const Found
   return m;
 }
 
-/// Laws beside the rig's description put right; what was tried is added to the ranking of `selection`.
-FoundSet laws_beside(const RigDescription& description, const DiagnoseProblem& problem, const Setting& files, const Trial& baseline, Selection& selection) {
+/// The effects of `set` beside the rig's description put right, from where they stand.
+Trial same_effects_beside(const RigDescription& description, const Trial& set) {
+  Trial same = prepare(*description.problem, description.trial, set.effects);
+  const JointProblem& known = set.arrival.joint;
+  for (Unknown& u : same.arrival.joint.unknowns())
+    for (const Unknown& k : known.unknowns())
+      if (const Parameter &p = same.arrival.joint.parameter(u), &q = known.parameter(k); !p.effect.empty() && p.effect == q.effect && p.place == q.place && u.run == k.run) u.value = k.value;
+  fit_fully(same, 6);
+  return same;
+}
+
+/// Laws beside the rig's description put right, from those of a set on; what was tried is added to the ranking of `selection`.
+FoundSet laws_beside(const RigDescription& description, const DiagnoseProblem& problem, const Setting& files, const Trial& baseline, Selection& selection, const Trial* set = nullptr) {
   DiagnoseProblem there = problem;
   there.rig = description.problem->rig;
   Selection beside(there, *description.problem, description.trial);
-  Trial best = beside.best_set();
+  std::optional<Trial> begun;
+  if (set) begun = same_effects_beside(description, *set);
+  Trial best = beside.best_set({}, begun ? &*begun : nullptr);
   if (beside.stopped()) throw OutOfTime{};
   FoundSet with = look_at(problem, files, baseline, {description.problem.get(), &description.heldout}, std::move(best), description.cost);
   for (Candidate c : beside.ranking()) {
@@ -366,7 +379,7 @@ Diagnosis diagnose_in_order(const DiagnoseProblem& problem, bool numbers_known) 
       return true;
     }
     asked = true;
-    FoundSet with = laws_beside(*rig, problem, files, baseline, *selection);
+    FoundSet with = laws_beside(*rig, problem, files, baseline, *selection, &set);
     if (!with.explains()) return false;
     description = rig;
     with.setting = {description->problem.get(), &description->heldout};

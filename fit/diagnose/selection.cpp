@@ -218,6 +218,7 @@ Trials Selection::try_one_more(const Trial& base, const Strings& hopeless) {
     const bool step_says_nothing = far && best_score < half_of_it && takes_small_steps(trial->arrival.joint);  // of corners that bend a trajectory
     if (brings_a_law(*trial) && !far && !may_be_seen(*trial, base)) continue;
     if (!promises_nothing && takes_too_little(*trial, base)) continue;
+    if (is_first(base) && follows_law && trial->score < 0) continue;  // dear to follow; a filter, which far away promises as little, is not
     if (prepared.size() <= few || promises_nothing || promises || step_says_nothing) (follows_law ? others : linear).push_back(std::move(*trial));
     else if (!follows_law) unpromising.push_back(std::move(*trial));
   }

@@ -1,6 +1,8 @@
 #include "fit/search/lost_run.h"
 
+#include <algorithm>
 #include <cmath>
+#include <cstddef>
 #include <optional>
 #include <utility>
 #include <vector>
@@ -65,6 +67,8 @@ std::optional<Trial> followed_by_the_others(const Trial& trial, std::size_t lost
 
 Trial with_lost_runs_followed(Trial trial) {
   if (trial.effects.empty() || !nonlinear(trial) || decays_decide(trial)) return trial;
+  // Where most runs are left with something it is not the search that is at fault.
+  if (2 * std::count_if(trial.variance.begin(), trial.variance.end(), [](double left) { return left < explained; }) <= static_cast<std::ptrdiff_t>(trial.variance.size())) return trial;
   for (std::size_t r = 0; r < trial.variance.size(); ++r) {
     if (trial.arrival.joint.runs()[r].is_aside() || !(trial.variance[r] > twice_the_noise)) continue;
     std::optional<Trial> again = followed_by_the_others(trial, r);
