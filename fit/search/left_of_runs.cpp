@@ -48,7 +48,7 @@ std::vector<Index> places_of(const RunResidual& run, const std::vector<Index>& s
 }
 
 /// Standard deviations of where filters of the gauge start, before the readings are looked at: in their own states, one column for each term of what the channel showed before the record, a power series in t whose k-th
-/// coefficient is about swing omega^k / k!, of the reading's own swing and frequency. A reading t^k/k! leaves the filter x' = F x + g y in -F^-(k+1) g at t = 0.
+/// coefficient is about swing omega^k / k!, of the reading's own swing and frequency. A reading t^k/k! leaves the filter x' = F x + g y in -F^-(k+1) g at t = 0. Not finite where the reading does not move.
 MatrixXd likely_starts(const LinearSystem& system, const VectorXd& reading, double dt) {
   std::vector<Index> others;
   for (Index i = 0; i < system.states(); ++i)
@@ -63,7 +63,7 @@ MatrixXd likely_starts(const LinearSystem& system, const VectorXd& reading, doub
   const double swing = (reading.array() - reading.mean()).matrix().norm(), omega = (reading.tail(reading.size() - 1) - reading.head(reading.size() - 1)).norm() / (dt * swing);
   start *= swing / std::sqrt(static_cast<double>(reading.size())) / shown;
   MatrixXd starts(F.rows(), F.rows());
-  for (Index k = 0; k < F.rows(); ++k, start = omega / static_cast<double>(k) * lu.solve(start)) starts.col(k) = start;
+  for (Index k = 0; k < F.rows(); ++k, start = omega * lu.solve(start)) starts.col(k) = start;
   return starts;
 }
 
@@ -74,8 +74,10 @@ void count_unknowns(const RunResidual& run, const VectorXd& theta, const RunResi
   left.unknowns = static_cast<double>(run.linear_unknowns());
   const LinearSystem system = run.model().system(run.conditions(), theta, run.channels());
   const auto told_of = [&](const std::vector<Index>& places, const MatrixXd& likely) { return VectorXd(Eigen::JacobiSVD<MatrixXd>(known_of(p, places).triangle * likely).singularValues()); };
-  if (const std::vector<Index> filters = places_of(run, system.filters); !filters.empty())
-    left.unknowns -= static_cast<double>(filters.size()) - told_of(filters, likely_starts(system, p.output.col(0), run.run().dt)).array().square().log1p().sum() / log_samples;
+  if (const std::vector<Index> filters = places_of(run, system.filters); !filters.empty()) {
+    const MatrixXd likely = likely_starts(system, p.output.col(0), run.run().dt);
+    if (likely.allFinite()) left.unknowns -= static_cast<double>(filters.size()) - told_of(filters, likely).array().square().log1p().sum() / log_samples;  // else the reading does not move
+  }
   std::vector<Index> others = system.settling;
   std::erase_if(others, [&](Index state) { return std::find(system.filters.begin(), system.filters.end(), state) != system.filters.end(); });
   if (const std::vector<Index> settling = places_of(run, others); !settling.empty()) {

@@ -3,8 +3,8 @@
 
 namespace unrig {
 
-/// Of a nonlinear fit that explains most runs and leaves one far from its noise: what it leaves where theta is that of the other runs, and the run is followed from afar there. A search among trajectories ends in one of many least
-/// chi-squares; runs that are followed tell theta, and with it which. The fit itself where that leaves less than half as much of no run.
+/// A nonlinear fit that explains most runs and leaves one far from its noise, once more with theta as the other runs have it and the one followed from afar there. The fit as it was where that does not take half of
+/// what it leaves. A search among trajectories ends in one of many least chi-squares; runs that are followed tell theta, and with it which.
 Trial with_lost_runs_followed(Trial trial);
 
 }  // namespace unrig
