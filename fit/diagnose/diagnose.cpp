@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
-#include <deque>
 #include <functional>
 #include <iterator>
 #include <memory>
@@ -17,6 +16,7 @@
 #include "core/law/law_effect.h"
 #include "core/rig/fingerprint.h"
 #include "fit/diagnose/as_given.h"
+#include "fit/diagnose/description_beside.h"
 #include "fit/diagnose/exact_model.h"
 #include "fit/diagnose/explanation.h"
 #include "fit/diagnose/law_answer.h"
@@ -240,69 +240,6 @@ MissingEffect missing_description(const RigDescription& description, const Found
   return m;
 }
 
-/// The effects of `set` beside the rig's description put right, from where they stand.
-Trial same_effects_beside(const RigDescription& description, const Trial& set) {
-  Trial same = prepare(*description.problem, description.trial, set.effects);
-  const JointProblem& known = set.arrival.joint;
-  for (Unknown& u : same.arrival.joint.unknowns())
-    for (const Unknown& k : known.unknowns())
-      if (const Parameter &p = same.arrival.joint.parameter(u), &q = known.parameter(k); !p.effect.empty() && p.effect == q.effect && p.place == q.place && u.run == k.run) u.value = k.value;
-  fit_fully(same, 6);
-  return same;
-}
-
-/// Laws beside the rig's description put right, from those of a set on; what was tried is added to the ranking of `selection`.
-FoundSet laws_beside(const RigDescription& description, const DiagnoseProblem& problem, const Setting& files, const Trial& baseline, Selection& selection, const Trial* set = nullptr) {
-  DiagnoseProblem there = problem;
-  there.rig = description.problem->rig;
-  Selection beside(there, *description.problem, description.trial);
-  std::optional<Trial> begun;
-  if (set) begun = same_effects_beside(description, *set);
-  Trial best = beside.best_set({}, begun ? &*begun : nullptr);
-  if (beside.stopped()) throw OutOfTime{};
-  FoundSet with = look_at(problem, files, baseline, {description.problem.get(), &description.heldout}, std::move(best), description.cost);
-  for (Candidate c : beside.ranking()) {
-    if (c.effects.empty()) continue;
-    c.effects.insert(c.effects.begin(), rig_description_id);
-    c.delta_bic += bic_difference(description.trial, baseline) + description.cost;
-    selection.add(std::move(c));
-  }
-  return with;
-}
-
-/// The rig's description beside laws, looked at once for each set.
-class DescriptionBeside {
- public:
-  explicit DescriptionBeside(const DiagnoseProblem& problem) : problem_(problem) {}
-  /// Where it explains what a set leaves.
-  const std::optional<RigDescription>& explains(const Trial& set) {
-    const auto known = std::find_if(looked_at_.begin(), looked_at_.end(), [&](const auto& l) { return same_set(l.first, set.effects); });
-    if (known != looked_at_.end()) return known->second;
-    std::optional<RigDescription> there = describe_rig(problem_, set, enough_to_name);
-    if (there && there->left > explained) there.reset();
-    return looked_at_.emplace_back(set.effects, std::move(there)).second;
-  }
-  /// What was seen in another noise.
-  void forget() { looked_at_.clear(); }
-
- private:
-  const DiagnoseProblem& problem_;
-  std::deque<std::pair<std::vector<std::string>, std::optional<RigDescription>>> looked_at_;
-};
-
-/// The rig's description against the laws that were `found`: with laws `beside` it, as far as these were looked for, where neither explains everything. True where it is the better explanation, then in `found`.
-bool weigh(const DiagnoseProblem& problem, const Setting& files, const Trial& baseline, const RigDescription& description, std::optional<FoundSet> beside, Selection& selection, SearchLimits& limits, FoundSet& found) {
-  const double against_baseline = bic_difference(description.trial, baseline) + description.cost;
-  selection.add({{rig_description_id}, description.trial.reduced_chi2(), against_baseline, 0, description.promised});
-  if (found.explains() && against_baseline > -decisive) return false;
-  FoundSet with = beside ? std::move(*beside) : look_at(problem, files, baseline, {description.problem.get(), &description.heldout}, description.trial, description.cost);
-  if (!with.explains() && !found.explains() && !beside) limits.spend([&] { with = laws_beside(description, problem, files, baseline, selection); });
-  const bool laws_named = !found.best.effects.empty() && naming_of(found.best, baseline, found.clean(), found.predicts) == Naming::named;
-  if (!with.explains() || (laws_named && bic_difference(found.best, with.best) - with.cost < -decisive)) return false;
-  found = std::move(with);
-  return true;
-}
-
 /// The exact model of a trial, against what was tried before laws.
 std::unique_ptr<ExactModel> held_against(const HiddenLaw& hidden, const FitProblem& files, const Trial& base, const Selection& selection, const FoundSet& found) {
   auto exact = std::make_unique<ExactModel>(hidden, files, base);
@@ -441,7 +378,7 @@ Diagnosis diagnose_in_order(const DiagnoseProblem& problem, bool numbers_known) 
     selection = std::make_unique<Selection>(problem, fit_problem, baseline);
     found = look_at(problem, files, baseline, files, baseline, 0);
   }
-  const bool described = description && weigh(problem, files, baseline, *description, std::move(beside), *selection, limits, found);
+  const bool described = description && weigh_description(problem, files, baseline, *description, std::move(beside), *selection, limits, found);
   if (described && laws) {
     laws.reset();
     fit_problem.rig.laws.clear();
