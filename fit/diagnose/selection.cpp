@@ -384,9 +384,16 @@ Trial Selection::settled(Trial trial) {
 void Selection::grow(Trial& best, const std::function<bool(const Trial&)>& enough, std::optional<Trial>& sufficient) {
   if (best.reduced_chi2() > twice_the_noise) take_known_lines(best);
   Strings hopeless;  // laws with which alone the fit is worse than without: from that far away they are not found, and are not tried again before half of the way is gone
-  while (!stopped_ && best.effects.size() < most_effects && what_remains(best).found) {
+  while (!stopped_ && what_remains(best).found) {
+    const double before = best.reduced_chi2();
     best = in_finer_steps(with_lost_runs_followed(best));
+    if (best.reduced_chi2() < before) ranking_.push_back({best.effects, best.reduced_chi2(), bic_difference(best, baseline_), 0, best.score});
     if (!what_remains(best).found) break;
+    if (!best.effects.empty() && enough && enough(best)) {
+      sufficient.reset();
+      return;
+    }
+    if (best.effects.size() == most_effects) break;
     if (decays_decide(best) && best.reduced_chi2() > twice_the_noise) break;  // trajectories that are not followed tell nothing of a second effect, in minutes each
     if (!sufficient && nonlinear(best) && best.excess() < (1 - enough_to_name) * baseline_.excess() && leaves_nothing(best)) sufficient = best;
     tell(best.effects.empty() ? "trying what may be missing" : "trying what may be missing beside " + best.effects.back());
@@ -402,10 +409,6 @@ void Selection::grow(Trial& best, const std::function<bool(const Trial&)>& enoug
     best = next;
     if (!stopped_) best = settled(without_superfluous(next));
     std::move(tried.begin(), tried.end(), std::back_inserter(tried_));
-    if (!stopped_ && enough && what_remains(best).found && enough(best)) {
-      sufficient.reset();
-      return;
-    }
   }
 }
 
@@ -417,7 +420,6 @@ Trial Selection::best_set(const std::function<bool(const Trial&)>& enough, const
       ranking_.push_back({best.effects, best.reduced_chi2(), bic_difference(best, baseline_), 0, 0});
       best = settled(without_superfluous(best));
     }
-    if (begun && enough && what_remains(best).found && enough(best)) return best;
     grow(best, enough, sufficient);
   } catch (const OutOfTime&) {
     stop();

@@ -323,7 +323,7 @@ void LawSearch::settle_first(std::vector<Trial>& tried) {
   if (all_driven(tried.front().arrival.joint)) fit_from_first_guesses(problem_, tried.front());
   settle(tried.front());
   tried.front() = with_lost_runs_followed(std::move(tried.front()));
-  if (!is_explained(tried.front())) tried.front() = in_finer_steps(std::move(tried.front()));
+  tried.front() = in_finer_steps(std::move(tried.front()));
   tried.front().is_settled = true;
 }
 

@@ -323,6 +323,11 @@ Trial in_finer_steps(Trial trial) {
   constexpr Eigen::Index finer = 4;
   if (trial.effects.empty() || !nonlinear(trial) || decays_decide(trial) || trial.reduced_chi2() > nearly_explained || trial.arrival.joint.runs().front().finer() >= finer) return trial;
   Trial again = trial;
+  for (RunResidual& run : again.arrival.joint.runs()) run.follow_in(finer);
+  measure(again);
+  double samples = 0;
+  for (const double n : trial.samples) samples += n;
+  if (samples * std::abs(again.reduced_chi2() - trial.reduced_chi2()) < decisive) return trial;  // its steps are fine enough
   follow_finer(again, finer);
   return again.excess() < 0.5 * trial.excess() ? again : trial;
 }
