@@ -236,9 +236,10 @@ LawSearch::Prospects LawSearch::rivals(const std::vector<AskedFor>& asked, const
 
 /// By the free decays; runs that are driven from first guesses, in full.
 void LawSearch::follow_decays(Trial& trial, const Trial& base, bool from_here) const {
-  hold_undetermined(trial);
+  const bool told = hold_undetermined(trial);
   if (all_driven(base.arrival.joint)) follow_nonlinear(problem_, trial, base, INFINITY);
   else if (nonlinear(trial)) trial.ruled_out = !fit_decays_first(trial, base, from_here);
+  if (!told && !trial.ruled_out) hold_undetermined(trial);  // of a spring that gives way, say, from a size at which it does at once
 }
 
 /// The simplest first.
@@ -357,15 +358,21 @@ void LawSearch::search_in_order(std::vector<Trial>& all) {
   tell(base_);
   Promised promised;
   const bool by_decays = among_ == Among::laws_and_forms && base_.reduced_chi2() > nearly_explained && shows_in_decays(base_);
-  std::vector<AskedFor> asked;
+  std::vector<AskedFor> asked, of_list;
+  std::vector<Trial> dear;  // laws followed in small steps, behind all others of the list
+  const auto try_the_first_two = [&] {
+    if (of_list.size() > 1 && !any_explains()) try_all({begun_with({of_list[0], of_list[1]})}, base_);
+  };
   if (by_decays) {
     asked = asked_by_decays();
-    std::vector<AskedFor> of_list;
     std::copy_if(asked.begin(), asked.end(), std::back_inserter(of_list), [](const AskedFor& a) { return !a.form.listed.empty(); });
     std::vector<Trial> alone;
-    for (const AskedFor& a : of_list) alone.push_back(begun_with({a}));
+    for (const AskedFor& a : of_list) {
+      Trial trial = begun_with({a});
+      (decays_decide(trial) ? dear : alone).push_back(std::move(trial));
+    }
     try_all(std::move(alone), base_, false);
-    if (of_list.size() > 1 && !any_explains()) try_all({begun_with({of_list[0], of_list[1]})}, base_);
+    if (dear.empty()) try_the_first_two();
   }
   const bool found = any_explains();
   if (among_ == Among::laws_and_forms && !found) {
@@ -376,6 +383,10 @@ void LawSearch::search_in_order(std::vector<Trial>& all) {
     promised = laws.promised;
     in_order_of_parameters(laws.laws);
     try_all(std::move(laws.laws), base_);
+    if (!dear.empty() && !any_explains()) {
+      try_all(std::move(dear), base_, false);
+      try_the_first_two();
+    }
   }
   if (!found && signals_leave_nothing(promised)) return;
   if (by_decays) {

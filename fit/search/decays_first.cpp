@@ -433,7 +433,8 @@ DecaysLeft fit_decays(JointProblem& joint, const std::string& id, bool from_here
   const std::unique_ptr<GrowingTrust> first = trust(1, follow_laws(joint) ? GrowingTrust::all_levels : GrowingTrust::first_levels);
   JointProblem found = joint;
   const double left = follow_exactly(found, *first);
-  if (left > followed && size != 0 && !from_here) {
+  const auto to_its_noise = [&] { return left < nearly_explained && !noise_left_of_decays(found).empty(); };
+  if (left > followed && size != 0 && !from_here && !to_its_noise()) {
     const std::unique_ptr<GrowingTrust> other = better_of_other_sizes(GrowingTrust::all_levels);
     if (const double others_left = other->better_than(*first) ? follow_exactly(joint, *other) : INFINITY; others_left < left) return {others_left, true};
   }

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 
 #include "core/effects/effect.h"
 #include "core/law/law_effect.h"
@@ -156,7 +157,7 @@ double deviance_difference(const Trial& a, const Trial& b) {
   for (std::size_t r = 0; r < a.variance.size(); ++r) {
     difference += better.samples[r] * (std::log(a.variance[r] / b.variance[r]) + log_unit(a.arrival.joint.runs()[r]) - log_unit(b.arrival.joint.runs()[r]));
     // Of a run that is not explained the gauge is weighted down, and does not bend the motion.
-    if (a.angle_samples[r] > 0 && std::max(a.variance[r], b.variance[r]) < explained) difference += b.angle_samples[r] * std::log(a.angle_variance[r] / b.angle_variance[r]);
+    if (a.angle_samples[r] > 0 && std::max(a.arrival.joint.runs()[r].tempered(), b.arrival.joint.runs()[r].tempered()) == 1) difference += b.angle_samples[r] * std::log(a.angle_variance[r] / b.angle_variance[r]);
   }
   return difference;
 }
@@ -210,10 +211,11 @@ bool may_be_seen(const Trial& screened, const Trial& base) {
   return base.reduced_chi2() > nearly_explained || samples * screened.score > decisive;
 }
 
-void hold_undetermined(Trial& trial) {
+bool hold_undetermined(Trial& trial) {
   glance(trial, true);
-  hold_undetermined(trial.arrival.joint);
+  const bool told = hold_undetermined(trial.arrival.joint);
   glance(trial, false);
+  return told;
 }
 
 Trial prepare(const FitProblem& problem, const Screening& screening, const Trial& base, const std::vector<std::string>& effects) {
@@ -319,17 +321,34 @@ void follow_finer(Trial& trial, Index times) {
   fit_fully(trial, 2);
 }
 
+namespace {
+
+/// Square sum of what finer steps alone move the readings by, over the noise.
+double moved_by_steps(const JointProblem& joint, Index times) {
+  std::vector<double> moved(joint.runs().size());
+  in_parallel(moved.size(), [&](std::size_t r) {
+    RunResidual run = joint.runs()[r];
+    if (run.is_aside()) return;
+    const Eigen::MatrixXd before = run.predict(joint.theta(r)).output;
+    run.follow_in(times);
+    const Eigen::MatrixXd after = run.predict(joint.theta(r)).output;
+    for (Index c = 0; c < after.cols(); ++c) moved[r] += (run.channel_weight(static_cast<std::size_t>(c)).array() * (after - before).col(c).array()).square().sum();
+  });
+  return std::accumulate(moved.begin(), moved.end(), 0.0);
+}
+
+}  // namespace
+
 Trial in_finer_steps(Trial trial) {
   constexpr Eigen::Index finer = 4;
-  if (trial.effects.empty() || !nonlinear(trial) || decays_decide(trial) || trial.reduced_chi2() > nearly_explained || trial.arrival.joint.runs().front().finer() >= finer) return trial;
-  Trial again = trial;
-  for (RunResidual& run : again.arrival.joint.runs()) run.follow_in(finer);
-  measure(again);
+  if (trial.effects.empty() || !nonlinear(trial) || decays_decide(trial) || trial.reduced_chi2() > nearly_explained || trial.excess() == 0 || trial.arrival.joint.runs().front().finer() >= finer) return trial;
+  constexpr double of_its_root = 0.293;  // 1 - sqrt(half_of_it): what moves the readings by less does not take half of what they are left with, by the triangle inequality
   double samples = 0;
-  for (const double n : trial.samples) samples += n;
-  if (samples * std::abs(again.reduced_chi2() - trial.reduced_chi2()) < decisive) return trial;  // its steps are fine enough
+  for (const RunResidual& run : trial.arrival.joint.runs()) samples += static_cast<double>(run.run().samples());
+  if (moved_by_steps(trial.arrival.joint, finer) < of_its_root * of_its_root * samples * trial.excess()) return trial;
+  Trial again = trial;
   follow_finer(again, finer);
-  return again.excess() < 0.5 * trial.excess() ? again : trial;
+  return again.excess() < half_of_it * trial.excess() ? again : trial;
 }
 
 double left_of_decays(const Trial& trial) {

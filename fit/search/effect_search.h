@@ -65,8 +65,8 @@ Trial screened(const FitProblem& problem, const Screening& screening, const Tria
 /// Whether what a law promises to first order could be decisive among the samples of `base`; of a base far from the noise always: a step says little there.
 bool may_be_seen(const Trial& screened, const Trial& base);
 
-/// Holds the unknowns of a screened trial that its runs do not determine: ready to be fitted.
-void hold_undetermined(Trial& trial);
+/// Holds the unknowns of a screened trial that its runs do not determine: ready to be fitted. False where the model does not stay finite, which tells nothing.
+bool hold_undetermined(Trial& trial);
 
 /// Both.
 Trial prepare(const FitProblem& problem, const Screening& screening, const Trial& base, const std::vector<std::string>& effects);

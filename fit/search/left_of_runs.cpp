@@ -7,6 +7,7 @@
 #include <cmath>
 
 #include "core/numerics/in_parallel.h"
+#include "core/numerics/prior_cost.h"
 #include "core/numerics/spectrum.h"
 #include "fit/likelihood/standardised_residual.h"
 
@@ -67,16 +68,16 @@ MatrixXd likely_starts(const LinearSystem& system, const VectorXd& reading, doub
   return starts;
 }
 
-/// What linear unknowns of a run cost. Of the states in which filters of the gauge start, ln det(1 + P K), K what the readings say of them and P what is likely: Laplace's evidence, since what a fast filter was
+/// What linear unknowns of a run cost. Of the states in which filters of the gauge start, Laplace's evidence, since what a fast filter was
 /// in has died out before many samples show it, and longer runs say no more of it (Berger, Bayarri and Pericchi, Econometric Reviews 33 (2014) 197). Of other states that settle, those combinations that the readings know
 /// better than the swing of the reading itself tells. Of the parts of a signal (LinearSystem::parts) those without which the evidence were less: what the others take of chi-square is left of the run instead.
 void count_unknowns(const RunResidual& run, const VectorXd& theta, const RunResidual::Prediction& p, double log_samples, LeftOfRun& left) {
   left.unknowns = static_cast<double>(run.linear_unknowns());
   const LinearSystem system = run.model().system(run.conditions(), theta, run.channels());
-  const auto told_of = [&](const std::vector<Index>& places, const MatrixXd& likely) { return VectorXd(Eigen::JacobiSVD<MatrixXd>(known_of(p, places).triangle * likely).singularValues()); };
   if (const std::vector<Index> filters = places_of(run, system.filters); !filters.empty()) {
     const MatrixXd likely = likely_starts(system, p.output.col(0), run.run().dt);
-    if (likely.allFinite()) left.unknowns -= static_cast<double>(filters.size()) - told_of(filters, likely).array().square().log1p().sum() / log_samples;  // else the reading does not move
+    const Known known = known_of(p, filters);
+    if (likely.allFinite()) left.unknowns -= static_cast<double>(filters.size()) - prior_cost(known.triangle, known.estimate, likely) / log_samples;  // else the reading does not move
   }
   std::vector<Index> others = system.settling;
   std::erase_if(others, [&](Index state) { return std::find(system.filters.begin(), system.filters.end(), state) != system.filters.end(); });
@@ -84,7 +85,8 @@ void count_unknowns(const RunResidual& run, const VectorXd& theta, const RunResi
     const VectorXd reading = p.output.col(0).array() - p.output.col(0).mean();
     const auto count = static_cast<Index>(settling.size());
     const double swing = reading.norm() / std::sqrt(static_cast<double>(reading.size()));
-    left.unknowns -= static_cast<double>(count - (told_of(settling, swing * MatrixXd::Identity(count, count)).array() > 1).count());
+    const VectorXd told = Eigen::JacobiSVD<MatrixXd>(swing * known_of(p, settling).triangle).singularValues();
+    left.unknowns -= static_cast<double>(count - (told.array() > 1).count());
   }
   for (const std::vector<Index>& part : system.parts) {  // each by itself: at frequencies apart they are all but orthogonal
     const std::vector<Index> places = places_of(run, part);

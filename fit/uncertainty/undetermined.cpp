@@ -31,9 +31,11 @@ void hold_modes_above_nyquist(JointProblem& joint, MatrixXd& jacobian) {
   }
 }
 
-void hold_undetermined(JointProblem& joint) {
+bool hold_undetermined(JointProblem& joint) {
   for (Unknown& u : joint.unknowns()) u.why_held.clear();
   MatrixXd jacobian = joint.linearise().jacobian;
+  const bool told = jacobian.allFinite();
+  if (!told) jacobian.setIdentity();
   hold_modes_above_nyquist(joint, jacobian);
   std::vector<Index> order(joint.unknowns().size());
   for (std::size_t i = 0; i < order.size(); ++i) order[i] = static_cast<Index>(i);
@@ -55,6 +57,7 @@ void hold_undetermined(JointProblem& joint) {
     if (unknown.held && unknown.why_held.empty()) unknown.why_held = length > 0 ? "These runs determine it only together with others" : "These runs do not respond to it";
     if (!unknown.held) span.push_back(rest.normalized());
   }
+  return told;
 }
 
 bool is_damping_ratio(const Parameter& p) { return p.role == Role::damping && p.unit == "1"; }

@@ -12,8 +12,9 @@ namespace unrig {
 /// What recordings cannot say: which unknowns of a joint fit are held, what the others owe to them; which combinations are determined: fit/uncertainty/determined.h.
 
 /// Unknowns that no run responds to, or only through a combination of others, are held where they are. Of a degenerate set the masses go first:
-/// a free decay fixes stiffness and damping per mass, and the mass of a structure is what is best known from drawings.
-void hold_undetermined(JointProblem& joint);
+/// a free decay fixes stiffness and damping per mass, and the mass of a structure is what is best known from drawings. False, and nothing held but modes that no run is sampled for, where the model does not stay finite in some run: that
+/// tells nothing.
+bool hold_undetermined(JointProblem& joint);
 
 /// A damping over the critical one, not in N s/m.
 bool is_damping_ratio(const Parameter& parameter);
