@@ -285,6 +285,10 @@ Diagnosis diagnose_in_order(const DiagnoseProblem& problem, bool numbers_known) 
     d.mismatch = locate_mismatch(baseline.arrival.joint);
     return true;
   };
+  if (description && description->from)
+    limits.spend([&] {
+      if (effects_beat_noise(problem, fit_problem, baseline, *description->from)) description.reset();
+    });
   coloured |= take_noise_of_description();
   const bool described_already = description && description->left < explained && !what_remains(description->trial).found;
   // What a set leaves may be noise that is not white, in which all is to be held against each other anew, or the rig's description.

@@ -33,8 +33,9 @@ void hold_modes_above_nyquist(JointProblem& joint, MatrixXd& jacobian) {
 
 bool hold_undetermined(JointProblem& joint) {
   for (Unknown& u : joint.unknowns()) u.why_held.clear();
-  MatrixXd jacobian = joint.linearise().jacobian;
-  const bool told = jacobian.allFinite();
+  const JointProblem::Linearisation lin = joint.linearise();
+  MatrixXd jacobian = lin.jacobian;
+  const bool told = jacobian.allFinite() && std::any_of(lin.run_chi2.begin(), lin.run_chi2.end(), [](double chi2) { return std::isfinite(chi2); });
   if (!told) jacobian.setIdentity();
   hold_modes_above_nyquist(joint, jacobian);
   std::vector<Index> order(joint.unknowns().size());

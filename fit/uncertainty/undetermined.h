@@ -12,7 +12,7 @@ namespace unrig {
 /// What recordings cannot say: which unknowns of a joint fit are held, what the others owe to them; which combinations are determined: fit/uncertainty/determined.h.
 
 /// Unknowns that no run responds to, or only through a combination of others, are held where they are. Of a degenerate set the masses go first:
-/// a free decay fixes stiffness and damping per mass, and the mass of a structure is what is best known from drawings. False, and nothing held but modes that no run is sampled for, where the model does not stay finite in some run: that
+/// a free decay fixes stiffness and damping per mass, and the mass of a structure is what is best known from drawings. False, and nothing held but modes that no run is sampled for, where the model does not stay finite, which
 /// tells nothing.
 bool hold_undetermined(JointProblem& joint);
 
