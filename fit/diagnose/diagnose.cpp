@@ -285,7 +285,7 @@ Diagnosis diagnose_in_order(const DiagnoseProblem& problem, bool numbers_known) 
     d.mismatch = locate_mismatch(baseline.arrival.joint);
     return true;
   };
-  if (description && description->from)
+  if (description && description->from)  // noise of a colour is the answer where effects have no better one
     limits.spend([&] {
       if (effects_beat_noise(problem, fit_problem, baseline, *description->from)) description.reset();
     });

@@ -4,8 +4,8 @@
 
 #include <cmath>
 #include <functional>
-#include <random>
 
+#include "tests/support/random_matrix.h"
 #include "tests/support/slope.h"
 
 namespace unrig {
@@ -14,13 +14,8 @@ namespace {
 using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
+using test::random_matrix;
 using test::is_slope;
-
-MatrixXd random_matrix(Index rows, Index cols, unsigned seed) {
-  std::mt19937_64 engine(seed);
-  std::normal_distribution<double> normal;
-  return MatrixXd::NullaryExpr(rows, cols, [&] { return normal(engine); });
-}
 
 /// M(theta) = M0 + theta_0 M1 + theta_0^2 M2 + theta_1 M3, one of three parameters without effect.
 struct Family {

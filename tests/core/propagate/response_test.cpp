@@ -3,9 +3,9 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <random>
 
 #include "core/run/motion.h"
+#include "tests/support/random_matrix.h"
 #include "tests/support/slope.h"
 
 namespace unrig {
@@ -14,15 +14,10 @@ namespace {
 using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
+using test::random_matrix;
 
 constexpr Index states = 7, channels = 2, inputs = 2;
 constexpr double dt = 0.05;
-
-MatrixXd random_matrix(Index rows, Index cols, unsigned seed) {
-  std::mt19937_64 engine(seed);
-  std::normal_distribution<double> normal;
-  return MatrixXd::NullaryExpr(rows, cols, [&] { return normal(engine); });
-}
 
 /// A stable system whose A, B, C and D move with theta_0, its B and D alone with theta_1; theta_2 does nothing. Motion in the last three states.
 LinearSystem system_at(const VectorXd& theta) {

@@ -127,10 +127,10 @@ TEST(Bic, WhereAFilterStartsCostsWhatIsLikelyOfIt) {
   unrig::Run half = pluck;
   for (Channel& c : half.channels) c.value.conservativeResize(pluck.samples() / 2);
   const double late = cost_of_starts(pluck);
-  constexpr double negligible = 3, level = 12;  // 2 ln of the swing over the noise, some 400, by which one sample tells the level that the delay was at
+  constexpr double negligible = 3, level = 12;  // beside what is decisive, 10; 2 ln of the swing over the noise, some 400, by which one sample tells the level that the delay was at
   EXPECT_NEAR(cost_of_starts(half), late, negligible);
   EXPECT_GT(late, level);
-  EXPECT_LT(late, 0.75 * 6 * std::log(static_cast<double>(pluck.samples())));
+  EXPECT_LT(late, 6 * std::log(static_cast<double>(pluck.samples())));
 }
 
 /// Of an autoregression of first order, n samples tell of its power what n (1 - r^2) / (1 + r^2) independent ones would (the mean of its spectrum, squared, over the mean of the square).
@@ -161,9 +161,11 @@ TEST(HoldUndetermined, HoldsNothingWhereTheModelRunsAway) {
   ASSERT_NE(spring, trial.arrival.joint.unknowns().end());
   ASSERT_TRUE(hold_undetermined(trial));
   ASSERT_EQ(held(), 0) << "otherwise this pluck tests nothing";
-  spring->value = -1e12;
-  EXPECT_FALSE(hold_undetermined(trial));
-  EXPECT_EQ(held(), 0);
+  for (const double coefficient : {-1e9, -1e10, -1e12, -1e15}) {
+    spring->value = coefficient;
+    EXPECT_FALSE(hold_undetermined(trial)) << coefficient;
+    EXPECT_EQ(held(), 0) << coefficient;
+  }
 }
 
 /// A hum as large as the noise, and no drift: whichever comes first, only the drift goes, and the hum is not fitted without.
