@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <numeric>
 #include <stdexcept>
 
 #include <fmt/format.h>
@@ -158,18 +159,16 @@ void add_modal_sensor(SensorKind reads, double shape, Index channel, Index i, co
   }
 }
 
-/// Of the inputs that a system with ports has, only those the run records, and what the feedback drives.
-void keep_inputs(LinearSystem& system, const Conditions& conditions) {
-  std::vector<Index> kept;
-  if (conditions.force) kept.push_back(0);
-  if (conditions.mount) kept.insert(kept.end(), {1, 2});
-  const auto feedbacks = static_cast<Index>(system.feedback.size());
-  for (Index k = system.B.cols() - feedbacks; k < system.B.cols(); ++k) kept.push_back(k);
+/// Of the inputs, those in `recorded` with their second derivatives behind them, and what the feedback drives.
+void keep_inputs(LinearSystem& system, const std::vector<Index>& recorded) {
+  const auto feedbacks = static_cast<Index>(system.feedback.size()), count = static_cast<Index>(recorded.size());
   for (DualMatrix* m : {&system.B, &system.D}) {
-    DualMatrix part(MatrixXd(m->rows(), static_cast<Index>(kept.size())), m->parameters());
-    for (std::size_t k = 0; k < kept.size(); ++k) part.set_block(0, static_cast<Index>(k), m->block(0, kept[k], m->rows(), 1));
+    DualMatrix part(MatrixXd::Zero(m->rows(), 2 * count + feedbacks), m->parameters());
+    for (Index k = 0; k < count; ++k) part.set_block(0, k, m->block(0, recorded[static_cast<std::size_t>(k)], m->rows(), 1));
+    part.set_block(0, 2 * count, m->block(0, m->cols() - feedbacks, m->rows(), feedbacks));
     *m = std::move(part);
   }
+  system.curved = count;
   for (Feedback& f : system.feedback)  // states that came later
     for (MatrixXd* m : {&f.sees, &f.sees_rates})
       if (m->rows() > 0) m->conservativeResizeLike(MatrixXd::Zero(m->rows(), system.states()));
@@ -261,7 +260,14 @@ LinearSystem AeroelasticModel::system(const Conditions& conditions, const Vector
       for (const GaugeFilter& filter : rig_.gauge_filters) append_gauge_filter(s, gauge - channels.begin(), filter);
     return s;
   };
-  if (effects_.empty()) return rig_.is_modal() ? modal_system(conditions, theta, channels) : amplify(beam_system(conditions, theta, channels));
+  if (effects_.empty()) {
+    LinearSystem system = rig_.is_modal() ? modal_system(conditions, theta, channels) : amplify(beam_system(conditions, theta, channels));
+    if (conditions.ports) return system;
+    std::vector<Index> all(static_cast<std::size_t>(system.B.cols()));
+    std::iota(all.begin(), all.end(), Index{0});
+    keep_inputs(system, all);
+    return system;
+  }
 
   Conditions with_ports = conditions;
   with_ports.force = with_ports.mount = with_ports.ports = true;
@@ -276,7 +282,10 @@ LinearSystem AeroelasticModel::system(const Conditions& conditions, const Vector
     first += static_cast<Index>(e.parameters_on(rig_).size());
   }
   system = amplify(std::move(system));
-  keep_inputs(system, conditions);
+  std::vector<Index> recorded;
+  if (conditions.force) recorded.push_back(0);
+  if (conditions.mount) recorded.insert(recorded.end(), {1, 2});
+  keep_inputs(system, recorded);
   return system;
 }
 

@@ -40,7 +40,7 @@ struct Conditions {
   bool force = false;             ///< a measured force at the calibration station
   bool mount = false;             ///< the mount moves: inputs velocity and acceleration
   double onset_angle = 0;  ///< rad, of the shaft before it moves; 0 where the run has no angle
-  bool ports = false;      ///< further inputs behind these: a normal force on each strip [N], a generalised force on each coordinate
+  bool ports = false;      ///< further inputs behind these: a normal force on each strip [N], a generalised force on each coordinate. All inputs are then straight between samples
   double nyquist = 0;  ///< Hz, half the sampling rate; 0: not known
 };
 
@@ -65,7 +65,7 @@ struct Feedback {
 ///
 /// States: modal displacements, modal velocities, aerodynamic lags (term by term, strip by strip; none at speed 0), and where the pitch is
 /// prescribed its angle p, rate and acceleration, driven by the jerk (piecewise constant for a cubic spline).
-/// Inputs u: force [N]; mount velocity [m/s] and acceleration [m/s^2] (whichever `Conditions` has, in this order), then what `feedback` drives.
+/// Inputs u: force [N]; mount velocity [m/s] and acceleration [m/s^2] (whichever `Conditions` has, in this order), their second derivatives in time, then what `feedback` drives.
 /// Outputs y: the run's fitted channels, in the order of `outputs`.
 struct LinearSystem {
   DualMatrix A, B, C, D;
@@ -73,6 +73,7 @@ struct LinearSystem {
   Eigen::Index coordinates = 0;
   Eigen::Index lags = 0;
   Eigen::Index motion = -1;  ///< index of the state p, or -1
+  Eigen::Index curved = 0;   ///< so many of the first inputs are cubic splines; their second derivatives are the next so many, whose columns in B and D are zero
   std::vector<Eigen::Index> settling;   ///< further states that are at rest where the rig is (a filter's)
   std::vector<Eigen::Index> filters;    ///< of them those of filters behind the reading of the first output
   std::vector<Eigen::Index> exogenous;  ///< further states whose initial value is unknown in every run (a signal's)

@@ -2,6 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
+
+#include "core/numerics/spectrum.h"
+#include "core/numerics/spline_curvature.h"
 
 namespace unrig {
 namespace {
@@ -21,6 +25,15 @@ VectorXd filled(VectorXd x) {
     before = k;
   }
   return x;
+}
+
+/// Whether the samples tell what lies between them: as much power as straight lines lose is more than there would be if all frequencies had what the last eighth of them has.
+bool is_resolved(const VectorXd& x) {
+  const VectorXd power = fourier(window_weights(Window::hann, x.size()).cwiseProduct((x.array() - x.mean()).matrix())).cwiseAbs2();
+  const Index lines = power.size(), last = lines / 8;
+  if (last == 0) return false;
+  const Eigen::ArrayXd phase = Eigen::ArrayXd::LinSpaced(lines, 0, std::numbers::pi);  // per sample
+  return power.tail(last).mean() * static_cast<double>(lines) < ((phase.square() / 12).square() * power.array()).sum();
 }
 
 MatrixXd mount_inputs(const Run& run) {
@@ -51,15 +64,13 @@ MatrixXd mount_inputs(const Run& run) {
 }  // namespace
 
 MatrixXd run_inputs(const Run& run, const Conditions& conditions) {
-  const Index n = run.samples();
-  MatrixXd input(n + 1, (conditions.force ? 1 : 0) + (conditions.mount ? 2 : 0));
-  Index column = 0;
-  if (conditions.force) {
-    input.col(column).head(n) = filled(run.channel("force").value);
-    ++column;
-  }
-  if (conditions.mount) input.middleCols(column, 2).topRows(n) = mount_inputs(run);
-  if (input.cols() > 0) input.row(n) = input.row(n - 1);
+  const Index n = run.samples(), force = conditions.force ? 1 : 0, count = force + (conditions.mount ? 2 : 0);
+  MatrixXd input = MatrixXd::Zero(n + 1, 2 * count);
+  if (const Channel* measured = run.find("force"); measured && conditions.force) input.col(0).head(n) = filled(measured->value);
+  if (conditions.mount) input.middleCols(force, 2).topRows(n) = mount_inputs(run);
+  for (Index i = 0; i < count; ++i)
+    if (is_resolved(input.col(i).head(n))) input.col(count + i).head(n) = spline_curvature(input.col(i).head(n), run.dt);
+  if (count > 0) input.row(n) = input.row(n - 1);
   return input;
 }
 

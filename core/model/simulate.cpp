@@ -83,16 +83,6 @@ Conditions conditions_for(const SimulateProblem& problem) {
   return conditions;
 }
 
-MatrixXd inputs_of(const Run& run, const Conditions& conditions) {
-  Conditions recorded = conditions;
-  recorded.force = run.find("force") != nullptr;
-  const MatrixXd measured = run_inputs(run, recorded);
-  if (recorded.force == conditions.force) return measured;
-  MatrixXd input = MatrixXd::Zero(measured.rows(), measured.cols() + 1);
-  input.rightCols(measured.cols()) = measured;
-  return input;
-}
-
 /// States that stay where they are under a constant column of drive: -A^-1 column, over those that are at rest where the rig is.
 VectorXd static_state(const LinearSystem& system, const VectorXd& column) {
   std::vector<Index> at_rest(static_cast<std::size_t>(system.free_states()));
@@ -163,7 +153,7 @@ MatrixXd response_of(const SimulateProblem& problem, const LinearSystem& system,
   if (jumps && !system.feedback.empty())
     throw InputError({run.file, 0}, "the angle jumps while a nonlinear effect is at work", "wanted only linear effects for ideal steps", "Leave out --jumps, or the effect.");
   const Motion motion = system.motion >= 0 && !jumps ? interpolated_motion(run.channel("alpha").value, run.dt) : Motion{};
-  const MatrixXd input = inputs_of(run, conditions);
+  const MatrixXd input = run_inputs(run, conditions);
   const VectorXd start = start_of(problem, system, motion);
   const ExactStep step = step_to_follow(system, run.dt);
   if (jumps && problem.signal_steps.size() > 0) throw std::invalid_argument("signals that step, and a shaft that jumps");

@@ -10,8 +10,12 @@ namespace unrig {
 ///
 ///   x_{k+1} = transition x_k + jerk j_k + input0 u_k + input1 u_{k+1}
 ///
-/// exact for a jerk that is constant over the step (cubic-spline motion) and inputs that are linear over it (first-order hold). All four are
-/// blocks of one matrix exponential, and carry exact partial derivatives.
+/// exact for a jerk that is constant over the step (cubic-spline motion), inputs that are linear over it (first-order hold), and those that are cubic splines:
+///
+///   u(s) = (1 - s) u_k + s u_{k+1} + dt^2/6 ((1 - s)^3 - (1 - s)) u''_k + dt^2/6 (s^3 - s) u''_{k+1},   s = (t - t_k)/dt in [0, 1]
+///
+/// whose second derivatives are inputs of their own (LinearSystem::curved). All four are blocks of one matrix exponential, and carry exact partial derivatives.
+/// Throws std::invalid_argument where there is no room for these.
 struct ExactStep {
   double dt = 0;
   DualMatrix transition;  ///< n x n
@@ -21,5 +25,8 @@ struct ExactStep {
 };
 
 ExactStep exact_step(const LinearSystem& system, double dt);
+
+/// Input `column` a share s in [0, 1] of the way from a sample to the next one: straight, or along its spline. `input`: one row per sample, `dt` [s] between them.
+double input_between(const LinearSystem& system, const Eigen::MatrixXd& input, double dt, Eigen::Index sample, double s, Eigen::Index column);
 
 }  // namespace unrig

@@ -4,6 +4,9 @@
 #include <algorithm>
 #include <cmath>
 #include <optional>
+#include <stdexcept>
+
+#include <fmt/format.h>
 
 #include "core/numerics/small_product.h"
 #include "core/numerics/work.h"
@@ -114,7 +117,9 @@ template <int M>
 class Follower {
  public:
   Follower(const LinearSystem& system, const ExactStep& exact, const VectorXd& theta, const NonlinearDrive& drive, Index samples, Partials partials)
-      : drive_(drive),
+      : system_(system),
+        drive_(drive),
+        dt_(exact.dt),
         per_sample_(steps_per_sample(system)),
         samples_(samples),
         steps_(samples * per_sample_),
@@ -243,9 +248,8 @@ class Follower {
       const Index sample = (first + k) / per_sample_, part = (first + k) % per_sample_;
       v[one_.jerk()] = drive_.jerk.size() > 0 ? drive_.jerk[sample] : 0;
       for (Index i = 0; i < q; ++i) {
-        const double per_step = (drive_.input(sample + 1, i) - drive_.input(sample, i)) / static_cast<double>(per_sample_);
-        v[one_.input() + i] = drive_.input(sample, i) + static_cast<double>(part) * per_step;
-        v[one_.input() + q + i] = v[one_.input() + i] + per_step;
+        v[one_.input() + i] = input_at(sample, part, i);
+        v[one_.input() + q + i] = input_at(sample, part + 1, i);
       }
       small_product(one_.step.data(), one_.rows(), one_.inputs(), v.data(), 0, 1, stepped_.data(), 0);
       if (part == 0) response_.output.row(sample) = stepped_.segment(one_.output(), one_.channels).transpose();
@@ -264,6 +268,13 @@ class Follower {
         return;
       }
     }
+  }
+
+  double input_at(Index sample, Index part, Index column) const {
+    if (part == 0) return drive_.input(sample, column);
+    if (part == per_sample_) return drive_.input(sample + 1, column);
+    const auto parts = static_cast<double>(per_sample_);
+    return input_between(system_, drive_.input, dt_ * parts, sample, static_cast<double>(part) / parts, column);
   }
 
   /// The tangents along the directions over the same steps: df = slope dz, where dz is solved for.
@@ -340,7 +351,9 @@ class Follower {
     return own;
   }
 
+  const LinearSystem& system_;
   const NonlinearDrive& drive_;
+  double dt_;  // of a step
   Index per_sample_, samples_, steps_;
   Arguments arguments_;
   Laws<M> laws_;
@@ -369,12 +382,21 @@ LinearSystem linear_part(LinearSystem system) {
   return system;
 }
 
+LinearSystem under_one_input(LinearSystem system, Index input) {
+  for (DualMatrix* m : {&system.A, &system.B, &system.C, &system.D}) m->partial.clear();
+  for (DualMatrix* m : {&system.B, &system.D}) *m = m->block(0, input, m->rows(), 1);
+  system.feedback.clear();
+  system.curved = 0;
+  return system;
+}
+
 ExactStep step_to_follow(const LinearSystem& system, double dt) { return exact_step(system, dt / static_cast<double>(steps_per_sample(system))); }
 
 NonlinearResponse follow(const LinearSystem& system, const ExactStep& step, const VectorXd& theta, const NonlinearDrive& drive, Index samples, Partials partials) {
   Index arguments = 0;
   for (const Feedback& f : system.feedback) arguments += f.sees.rows();
   const auto feedbacks = static_cast<Index>(system.feedback.size());
+  if (const Index measured = system.B.cols() - feedbacks; drive.input.cols() != measured) throw std::invalid_argument(fmt::format("a system of {} measured inputs cannot be driven by {}", measured, drive.input.cols()));
   if (feedbacks == 1 && arguments == 1) return Follower<one>(system, step, theta, drive, samples, partials).run();
   if (std::max(feedbacks, arguments) <= in_a_handful) return Follower<handful>(system, step, theta, drive, samples, partials).run();
   return Follower<many>(system, step, theta, drive, samples, partials).run();

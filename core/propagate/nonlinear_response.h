@@ -11,7 +11,7 @@ namespace unrig {
 struct NonlinearDrive {
   Eigen::VectorXd start;          ///< n
   Eigen::VectorXd jerk;           ///< one per sample; empty: none
-  Eigen::MatrixXd input;          ///< measured inputs, samples + 1 rows, straight in between; no columns: none
+  Eigen::MatrixXd input;          ///< measured inputs, samples + 1 rows, in between as the system takes them (input_between); no columns: none
   Eigen::MatrixXd start_tangent;  ///< n x K
   Eigen::MatrixXd jerk_tangent;   ///< samples x K; empty: the directions do not touch the jerk
   Eigen::MatrixXd start_partial = {};  ///< n x P, of the start in theta; empty: none
@@ -30,12 +30,15 @@ struct NonlinearResponse {
 /// The system without its laws and the inputs that these drive: what is left of B and D belongs to what was measured.
 LinearSystem linear_part(LinearSystem system);
 
+/// The system without partials and laws under one of its inputs alone, which runs straight between samples.
+LinearSystem under_one_input(LinearSystem system, Eigen::Index input);
+
 /// The step that `follow` takes: a sample, or as small a part of it as the most demanding of the system's feedbacks wants.
 ExactStep step_to_follow(const LinearSystem& system, double dt);
 
 /// Follows x' = A x + J jerk + B [u; f(S x)] in equal steps (step_to_follow). The linear part is exact; the nonlinear forces run straight from step to step
 /// (first-order hold), so that a force of angular frequency w is off by (w dt)^2/12 of itself, dt the step. The force at the end of a step is solved for together with the state, so
-/// that stiff and dissipative laws stay stable. Tangents are exact derivatives of this recursion: K directions, and the partials in theta where asked.
+/// that stiff and dissipative laws stay stable. Throws std::invalid_argument where the system has another number of measured inputs. Tangents are exact derivatives of this recursion: K directions, and the partials in theta where asked.
 NonlinearResponse follow(const LinearSystem& system, const ExactStep& step, const Eigen::VectorXd& theta, const NonlinearDrive& drive, Eigen::Index samples,
                          Partials partials);
 

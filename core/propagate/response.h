@@ -46,7 +46,7 @@ class FreeResponse {
 Response coast(const LinearSystem& system, const ExactStep& step, const DualMatrix& start, Eigen::Index samples, Partials partials);
 
 /// Driven response: `jerk` one value per sample (empty: none), `input` samples + 1 rows of inputs (empty: none). Exact for cubic-spline
-/// motion and inputs linear between samples; one n x n product per sample and parameter. Throws std::invalid_argument where the system has another number of inputs.
+/// motion and inputs that are linear between samples or cubic splines (exact_step); one n x n product per sample and parameter. Throws std::invalid_argument where the system has another number of inputs.
 Response drive(const LinearSystem& system, const ExactStep& step, const DualMatrix& start, Eigen::Index samples, const Eigen::VectorXd& jerk,
                const Eigen::MatrixXd& input, Partials partials);
 

@@ -47,8 +47,7 @@ MatrixXd diffusion_of(const MatrixXd& A, double dt) {
 
 Driven driven(const AeroelasticModel& model, const Run& run, const VectorXd& theta, double reading_scale) {
   Conditions conditions = conditions_of(run);
-  const MatrixXd input = run_inputs(run, conditions);
-  const bool measured_force = conditions.force;
+  const bool driven = conditions.force || conditions.mount;
   conditions.force = true;  // the load's way in
   const LinearSystem rig = model.system(conditions, theta, {"gauge"});
   const Index n = rig.states();
@@ -64,13 +63,13 @@ Driven driven(const AeroelasticModel& model, const Run& run, const VectorXd& the
   s.C = DualMatrix(MatrixXd::Zero(1, n + 2));
   s.C.value.leftCols(n) = rig.C.value;
   s.C.value(0, n) = rig.D.value(0, 0) / steady;
-  const Index skip = measured_force ? 0 : 1, inputs = rig.B.cols() - skip;
-  s.B = DualMatrix(MatrixXd::Zero(n + 2, inputs));
-  s.B.value.topRows(n) = rig.B.value.rightCols(inputs);
-  s.D = DualMatrix(MatrixXd(rig.D.value.rightCols(inputs)));
+  s.B = DualMatrix(MatrixXd::Zero(n + 2, rig.B.cols()));
+  s.B.value.topRows(n) = rig.B.value;
+  s.D = DualMatrix(rig.D.value);
+  s.curved = rig.curved;
   const ExactStep step = exact_step(s, run.dt);
   result.from_inputs = VectorXd::Zero(run.samples());
-  if (inputs > 0) result.from_inputs = drive(s, step, DualMatrix(MatrixXd::Zero(n + 2, 1)), run.samples(), {}, input, Partials::none).output.col(0);
+  if (driven) result.from_inputs = drive(s, step, DualMatrix(MatrixXd::Zero(n + 2, 1)), run.samples(), {}, run_inputs(run, conditions), Partials::none).output.col(0);
 
   // A start that is unknown by the size of the reading: each mode's displacement that reads so, its rate and the load's over a sample.
   VectorXd scale = VectorXd::Constant(n + 2, reading_scale);

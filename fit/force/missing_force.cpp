@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "core/propagate/exact_step.h"
+#include "core/propagate/nonlinear_response.h"
 #include "core/numerics/in_parallel.h"
 #include "core/numerics/work.h"
 
@@ -215,10 +216,7 @@ std::vector<MissingForce> missing_forces(const JointProblem& joint) {
     Conditions conditions = run.conditions();
     if (conditions.mount || conditions.force) return;  // driven already
     conditions.force = true;
-    LinearSystem system = joint.model().system(conditions, theta, {"gauge"});
-    for (DualMatrix* m : {&system.A, &system.B, &system.C, &system.D}) m->partial.clear();
-    system.feedback.clear();
-    for (DualMatrix* m : {&system.B, &system.D}) *m = m->block(0, 0, m->rows(), 1);
+    const LinearSystem system = under_one_input(joint.model().system(conditions, theta, {"gauge"}), 0);
     const RunResidual::Prediction p = run.predict(theta);
     VectorXd left = run.run().channel("gauge").value - p.output.col(0);
     for (Index k = 0; k < left.size(); ++k)

@@ -7,6 +7,7 @@
 
 #include "core/law/law_effect.h"
 #include "core/numerics/in_parallel.h"
+#include "core/propagate/nonlinear_response.h"
 #include "fit/force/missing_force.h"
 
 namespace unrig {
@@ -58,10 +59,7 @@ Port port_of(const RunResidual& run, const VectorXd& theta, ActsOn place) {
       if (model.parameters()[i].name == own[k].name) values[static_cast<Index>(i)] = theta[static_cast<Index>(k)];
   Port port{model.system(run.conditions(), values, {run.channels().front()}), {}};
   LinearSystem& s = port.system;
-  for (DualMatrix* m : {&s.A, &s.B, &s.C, &s.D}) m->partial.clear();
-  s.feedback.clear();
-  const Index last = s.B.cols() - 1;
-  for (DualMatrix* m : {&s.B, &s.D}) *m = m->block(0, last, m->rows(), 1);
+  s = under_one_input(std::move(s), s.B.cols() - 1);
   const RowVectorXd shape = first_mode(model, s.coordinates);
   port.reads = MatrixXd::Zero(4, s.states());
   port.reads.row(0) = displacement_of(s, shape);

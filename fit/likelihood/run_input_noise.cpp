@@ -89,6 +89,8 @@ std::shared_ptr<const InputNoise> RunResidual::Linearised::noise_through(const R
   return std::make_shared<const InputNoise>(linear, exact_step(linear, run.run_->dt), *inputs, run.tempered_ * run.weight_);
 }
 
+bool RunResidual::may_be_coloured() const { return arrival_.rows() == 0 && !Linearised::input_noise(*this); }
+
 MatrixXd RunResidual::Linearised::white(const RunResidual& run, const MatrixXd& rows) const { return noise->whitened(rows) / run.tempered_; }
 
 MatrixXd RunResidual::Linearised::white_slopes(const RunResidual& run, const VectorXd& theta, MatrixXd rows) const {

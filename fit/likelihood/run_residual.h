@@ -178,8 +178,8 @@ class RunResidual {
   /// efficient), unless those of third order are smaller by more than chance. A coarse converter's error is what it is at rest, half a step at most, and may be more than before.
   void settle_noise(const Eigen::VectorXd& theta);
 
-  /// Whether a colour can be set: where nothing measured drives the model and it goes on from no other part.
-  bool may_be_coloured() const { return arrival_.rows() == 0 && inputs_.cols() == 0; }
+  /// Whether a colour can be set: where noise of no measured input colours the readings already, and the model goes on from no other part.
+  bool may_be_coloured() const;
   using Colours = std::vector<std::optional<NoiseColour>>;
   /// The colour of each channel's noise in what the model at theta leaves of it at rest (fit/likelihood/noise_colour.h); where others have shown what to expect, that in this run's size.
   Colours colours(const Eigen::VectorXd& theta, const std::vector<ChannelColour>& expected) const;

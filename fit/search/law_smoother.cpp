@@ -36,13 +36,12 @@ LawSmoother::LawSmoother(const RunResidual& run, std::vector<Index> parameters) 
         measured_(k * parts_, c) = value[k];
       }
   }
-  if (parts_ > 1 && inputs_.cols() > 0) {  // straight between samples
+  if (parts_ > 1 && inputs_.cols() > 0) {
     const MatrixXd at_samples = inputs_;
     inputs_.resize(samples_, at_samples.cols());
-    for (Index k = 0; k < samples_; ++k) {
-      const double part = static_cast<double>(k % parts_) / static_cast<double>(parts_);
-      inputs_.row(k) = (1 - part) * at_samples.row(k / parts_) + part * at_samples.row(std::min(k / parts_ + 1, at_samples.rows() - 1));
-    }
+    for (Index k = 0; k < samples_; ++k)
+      for (Index i = 0; i < inputs_.cols(); ++i)
+        inputs_(k, i) = input_between(first, at_samples, run.run().dt, k / parts_, static_cast<double>(k % parts_) / static_cast<double>(parts_), i);
   }
 }
 

@@ -41,7 +41,7 @@ Part part_of(const RunResidual& run) {
   }
   const MatrixXd inputs = run_inputs(run.run(), run.conditions()).topRows(n + 1);
   if (run.conditions().force) part.force = inputs.col(0);
-  if (run.conditions().mount) part.acceleration = inputs.rightCols(1);
+  if (run.conditions().mount) part.acceleration = inputs.col(run.conditions().force ? 2 : 1);
   return part;
 }
 

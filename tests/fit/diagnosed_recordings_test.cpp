@@ -62,7 +62,7 @@ TEST(DiagnosedRecordings, OscillatorHasCubicStiffness) {
   ASSERT_EQ(d.runs.size(), 2u);
   for (const ImprovedRun& run : d.runs) {
     EXPECT_GT(run.rms_before, 6e-3) << run.file;
-    EXPECT_LT(run.rms_after, 0.90e-3) << run.file;
+    EXPECT_LT(run.rms_after, 0.35e-3) << run.file << ": 0.90 mV under a force that runs straight between its samples; published: 0.23 to 0.3 mV, of models with more terms";
   }
 }
 

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <array>
 #include <cmath>
 #include <numbers>
 #include <random>
@@ -23,8 +24,9 @@ struct Truth {
   double damping() const { return 2 * damping_ratio * mass * 2 * pi * hertz; }
 };
 
-/// Displacement [m] under a force that runs straight between samples: m x'' + c x' + k x + F z = u, by the classical Runge-Kutta method with ten steps a sample.
-VectorXd driven(const Truth& t, const VectorXd& input, double dt) {
+/// Displacement [m] under a force u(t): m x'' + c x' + k x + F z = u, by the classical Runge-Kutta method with ten steps a sample.
+template <typename Force>
+VectorXd driven(const Truth& t, const Force& force, Index samples, double dt) {
   constexpr int finer = 10;
   const double h = dt / finer;
   using State = Eigen::Vector3d;
@@ -33,12 +35,11 @@ VectorXd driven(const Truth& t, const VectorXd& input, double dt) {
     return State(s[1], (u - t.force * s[2] - t.damping() * s[1] - t.stiffness() * s[0]) / t.mass, s[1] / t.yield * (1 - std::pow(std::abs(s[2]), t.sharpness) * (t.shape + (1 - t.shape) * side)));
   };
   State s = State::Zero();
-  VectorXd reading(input.size());
-  for (Index k = 0; k < input.size(); ++k) {
+  VectorXd reading(samples);
+  for (Index k = 0; k < samples; ++k) {
     reading[k] = s[0];
-    const double next = k + 1 < input.size() ? input[k + 1] : input[k];
     for (int i = 0; i < finer; ++i) {
-      const auto u = [&](double part) { return input[k] + (next - input[k]) * (i + part) / finer; };
+      const auto u = [&](double part) { return force(dt * static_cast<double>(k) + h * (i + part)); };
       const State a = slope(s, u(0)), b = slope(s + h / 2 * a, u(0.5)), c = slope(s + h / 2 * b, u(0.5)), d = slope(s + h * c, u(1));
       s += h / 6 * (a + 2 * b + 2 * c + d);
     }
@@ -61,12 +62,16 @@ constexpr double dt = 2e-3, noise = 2e-5;
 FitProblem recorded(const Truth& truth, unsigned seed, Index samples) {
   std::mt19937_64 random(seed);
   std::uniform_real_distribution<double> phase(0, 2 * pi);
-  VectorXd force = VectorXd::Zero(samples);
-  for (int line = 1; line <= 60; ++line) {  // 0.2 to 12 Hz
-    const double at = phase(random);
-    for (Index k = 0; k < samples; ++k) force[k] += 3 * std::sin(2 * pi * 0.2 * line * dt * static_cast<double>(k) + at);
-  }
-  VectorXd reading = driven(truth, force, dt);
+  std::array<double, 60> at{};  // of lines from 0.2 to 12 Hz
+  for (double& a : at) a = phase(random);
+  const auto force_at = [&](double time) {
+    double sum = 0;
+    for (std::size_t line = 0; line < at.size(); ++line) sum += 3 * std::sin(2 * pi * 0.2 * static_cast<double>(line + 1) * time + at[line]);
+    return sum;
+  };
+  VectorXd force(samples);
+  for (Index k = 0; k < samples; ++k) force[k] = force_at(dt * static_cast<double>(k));
+  VectorXd reading = driven(truth, force_at, samples, dt);
   std::normal_distribution<double> white(0, noise);
   for (double& x : reading) x += white(random);
 

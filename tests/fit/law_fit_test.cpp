@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <array>
 #include <cmath>
 #include <filesystem>
 #include <functional>
@@ -32,20 +33,21 @@ struct Truth {
   std::function<double(const State&)> force, rate = [](const State&) { return 0.0; };
 };
 
-/// Displacement [m] of m q'' + c q' + k q = F(q, q', z) + u(t) by the classical Runge-Kutta method, ten steps a sample; u runs straight between samples.
-VectorXd recorded(const Truth& truth, double first, const VectorXd& input, double noise, unsigned seed) {
+using Input = std::function<double(double)>;  // force over time
+
+/// Displacement [m] of m q'' + c q' + k q = F(q, q', z) + u(t) by the classical Runge-Kutta method, ten steps a sample.
+VectorXd recorded(const Truth& truth, double first, const Input& input, Index samples, double noise, unsigned seed) {
   constexpr int finer = 10;
   const double h = dt / finer;
   const auto slope = [&](const State& s, double u) { return State(s[1], (u + truth.force(s) - damping * s[1] - stiffness * s[0]) / mass, truth.rate(s)); };
   State s(first, 0, 0);
   std::mt19937_64 random(seed);
   std::normal_distribution<double> white(0, noise);
-  VectorXd reading(input.size());
-  for (Index k = 0; k < input.size(); ++k) {
+  VectorXd reading(samples);
+  for (Index k = 0; k < samples; ++k) {
     reading[k] = s[0] + white(random);
-    const double next = k + 1 < input.size() ? input[k + 1] : input[k];
     for (int i = 0; i < finer; ++i) {
-      const auto u = [&](double part) { return input[k] + (next - input[k]) * (i + part) / finer; };
+      const auto u = [&](double part) { return input(dt * static_cast<double>(k) + h * (i + part)); };
       const State a = slope(s, u(0)), b = slope(s + h / 2 * a, u(0.5)), c = slope(s + h / 2 * b, u(0.5)), d = slope(s + h * c, u(1));
       s += h / 6 * (a + 2 * b + 2 * c + d);
     }
@@ -53,7 +55,7 @@ VectorXd recorded(const Truth& truth, double first, const VectorXd& input, doubl
   return reading;
 }
 
-FitProblem problem_of(const Truth& truth, double first, const VectorXd& input, double noise) {
+FitProblem problem_of(const Truth& truth, double first, const Input& input, Index samples, double noise) {
   FitProblem problem;
   problem.rig.file = "rig.toml";
   problem.rig.modal = {{mass, 1.03 * hertz, 0.01, 1, "m"}};
@@ -61,8 +63,8 @@ FitProblem problem_of(const Truth& truth, double first, const VectorXd& input, d
   run.file = "run.csv";
   run.kind = first != 0 ? RunKind::pluck : RunKind::forced;
   run.dt = dt;
-  run.channels = {{"gauge", "m", "m", 1, recorded(truth, first, input, noise, 5), 0}};
-  if (first == 0) run.channels.push_back({"force", "N", "N", 1, input, 0});
+  run.channels = {{"gauge", "m", "m", 1, recorded(truth, first, input, samples, noise, 5), 0}};
+  if (first == 0) run.channels.push_back({"force", "N", "N", 1, VectorXd::LinSpaced(samples, 0, dt * static_cast<double>(samples - 1)).unaryExpr(input), 0});
   problem.runs = {run};
   return problem;
 }
@@ -79,15 +81,18 @@ const FittedParameter& parameter(const FitResult& result, const std::string& nam
   return result.parameters.front();
 }
 
-VectorXd tones(Index samples, double size) {
+double no_force(double) { return 0; }
+
+Input tones(double size) {
   std::mt19937_64 random(7);
   std::uniform_real_distribution<double> phase(0, 2 * pi);
-  VectorXd force = VectorXd::Zero(samples);
-  for (int line = 1; line <= 60; ++line) {  // 0.2 to 12 Hz
-    const double at = phase(random);
-    for (Index k = 0; k < samples; ++k) force[k] += size * std::sin(2 * pi * 0.2 * line * dt * static_cast<double>(k) + at);
-  }
-  return force;
+  std::array<double, 60> at{};  // of lines from 0.2 to 12 Hz
+  for (double& a : at) a = phase(random);
+  return [=](double time) {
+    double force = 0;
+    for (std::size_t line = 0; line < at.size(); ++line) force += size * std::sin(2 * pi * 0.2 * static_cast<double>(line + 1) * time + at[line]);
+    return force;
+  };
 }
 
 const std::string grows = R"toml(unrig_law = 1
@@ -104,7 +109,7 @@ v = "0.1 m/s"
 TEST(LawFit, FindsPowerAndSizeOfADamping) {
   constexpr double c = 0.6, p = 2.6, noise = 2e-5;
   const Truth truth{[](const State& s) { return -c * std::pow(std::abs(s[1]) / 0.1, p) * (s[1] > 0 ? 1 : -1); }};
-  FitProblem problem = problem_of(truth, 0.01, VectorXd::Zero(2000), noise);
+  FitProblem problem = problem_of(truth, 0.01, no_force, 2000, noise);
   EXPECT_GT(fit(problem).runs[0].channels[0].rms_residual, 3 * noise) << "a linear rig does not explain it";
   add(problem, grows);
   const FitResult result = fit(problem);
@@ -122,8 +127,8 @@ TEST(LawFit, FindsPowerAndSizeOfADamping) {
 TEST(LawFit, LearnsHowFarItsRunsGo) {
   constexpr double first = 0.01, noise = 2e-5;
   const Truth truth{[](const State& s) { return -8 * std::abs(s[1]) * s[1] - 2e5 * s[0] * s[0] * s[0]; }};
-  FitProblem problem = problem_of(truth, first, VectorXd::Zero(1500), noise);
-  const VectorXd x = recorded(truth, first, VectorXd::Zero(1500), 0, 1);
+  FitProblem problem = problem_of(truth, first, no_force, 1500, noise);
+  const VectorXd x = recorded(truth, first, no_force, 1500, 0, 1);
   const VectorXd v = (x.tail(1498) - x.head(1498)) / (2 * dt);
   add(problem, "unrig_law = 1\nname = \"both\"\nacts_on = \"normal\"\nforce = \"-c * abs(v) * v - k * x^3\"\n[parameters]\nc = { start = \"5 N.s^2/m^2\" }\nk = { start = \"1e5 N/m^3\" }\n[learnt_on]\nx = [\"-9 m\", \"9 m\"]\n");
   const FitResult result = fit(problem);
@@ -143,7 +148,7 @@ TEST(LawFit, OfHysteresisIsThatOfTheCompiledEffect) {
                       const double side = s[1] * s[2] > 0 ? 1 : s[1] * s[2] < 0 ? -1 : 0;
                       return s[1] / 2e-3 * (1 - std::abs(s[2]) * (0.4 + 0.6 * side));
                     }};
-  FitProblem by_name = problem_of(truth, 0, tones(4000, 3), noise), by_file = by_name;
+  FitProblem by_name = problem_of(truth, 0, tones(3), 4000, noise), by_file = by_name;
   by_name.effects = {"bouc-wen"};
   add(by_file, R"toml(unrig_law = 1
 name = "hysteresis"
@@ -170,7 +175,7 @@ n = { start = 1, lower = 0.5, upper = 4 }
 TEST(LawFit, OfTwoLawsIsCarriedWholeByItsFile) {
   constexpr double noise = 2e-5;
   const Truth truth{[](const State& s) { return -30 * std::abs(s[1]) * s[1] - 2e6 * s[0] * s[0] * s[0]; }};
-  FitProblem problem = problem_of(truth, 0, tones(4000, 3), noise);
+  FitProblem problem = problem_of(truth, 0, tones(3), 4000, noise);
   add(problem, "unrig_law = 1\nname = \"drag\"\nacts_on = \"normal\"\nforce = \"-c * abs(v) * v\"\n[parameters]\nc = { start = \"10 N.s^2/m^2\", lower = \"0 N.s^2/m^2\" }\n");
   add(problem, "unrig_law = 1\nname = \"hard\"\nacts_on = \"normal\"\nforce = \"-k * x^3\"\n[parameters]\nk = { start = \"1e6 N/m^3\" }\n");
   const FitResult result = fit(problem);

@@ -90,10 +90,6 @@ Run bare_run(const std::string& name, const Setting& s, Random& random) {
       const double f = between(random, 0.5, 0.12 / s.dt), phase = between(random, 0, 2 * pi);
       force += t.unaryExpr([&](double x) { return std::sin(2 * pi * f * x + phase); });
     }
-    for (Index k = 0; k < force.size(); ++k) {  // the recorded force runs straight from sample to sample: that much of it is known
-      const Index before = k / finer * finer, after = std::min(before + finer, (samples - 1) * finer);
-      if (k != before) force[k] = force[before] + (force[after] - force[before]) * static_cast<double>(k - before) / finer;
-    }
     put(run, "force", "N", force / std::sqrt(20.0));
   } else {
     put(run, "alpha", "rad", VectorXd::Zero(t.size()));

@@ -31,11 +31,21 @@ VectorXd some_state(Index n) {
   return state;
 }
 
-/// Classical Runge-Kutta for x' = A x + J jerk + B u with u linear over the step.
+/// Three inputs, and second derivatives that bend them by as much as they are.
+VectorXd some_inputs(double size) {
+  VectorXd u = size * some_state(6);
+  u.tail(3) /= dt * dt;
+  return u;
+}
+
+/// Classical Runge-Kutta for x' = A x + J jerk + B u. The first half of u are cubics over the step, the second half their second derivatives, straight.
 VectorXd runge_kutta(const LinearSystem& system, VectorXd x, double jerk, const VectorXd& u0, const VectorXd& u1, int steps) {
   const double h = dt / steps;
   const auto slope = [&](double t, const VectorXd& state) {
-    VectorXd d = system.A.value * state + system.B.value * (u0 + t / dt * (u1 - u0));
+    const double s = t / dt;
+    VectorXd u = u0 + s * (u1 - u0);
+    u.head(3) += dt * dt * (-s / 3 + s * s / 2 - s * s * s / 6) * u0.tail(3) + dt * dt * (s * s * s - s) / 6 * u1.tail(3);
+    VectorXd d = system.A.value * state + system.B.value * u;
     d[system.motion + 2] += jerk;
     return d;
   };
@@ -51,7 +61,7 @@ TEST(Propagator, IsTheLimitOfRungeKutta) {
   const AeroelasticModel model = seed::model(rig(), 3, 1, wagner(Wagner::within_1e4));
   const LinearSystem system = model.system(all_inputs(), model.start_values(), {});
   const ExactStep step = exact_step(system, dt);
-  const VectorXd start = some_state(system.states()), u0 = some_state(3), u1 = -2 * some_state(3);
+  const VectorXd start = some_state(system.states()), u0 = some_inputs(1), u1 = some_inputs(-2);
   const double jerk = 40;
   const VectorXd exact = step.transition.value * start + jerk * step.jerk.value + step.input0.value * u0 + step.input1.value * u1;
   double last = 0;

@@ -35,8 +35,11 @@ class ResponseOfARig {
     if (system_.motion >= 0) start_.segment(system_.motion, 3).setZero();
     jerk_ = VectorXd::Zero(system_.motion >= 0 ? samples : 0);
     for (Index k = 0; k < jerk_.size(); ++k) jerk_[k] = 100 * std::sin(0.2 * static_cast<double>(k));
-    inputs_ = MatrixXd(samples + 1, 3);
-    for (Index k = 0; k <= samples; ++k) inputs_.row(k) << std::cos(0.1 * static_cast<double>(k)), 0.002 * std::sin(0.15 * static_cast<double>(k)), 0.15 * std::cos(0.15 * static_cast<double>(k));
+    inputs_ = MatrixXd(samples + 1, 6);
+    const double push = 0.1, shake = 0.15;  // radians per sample
+    for (Index k = 0; k <= samples; ++k)
+      inputs_.row(k).head(3) << std::cos(push * static_cast<double>(k)), 0.002 * std::sin(shake * static_cast<double>(k)), 0.15 * std::cos(shake * static_cast<double>(k));
+    inputs_.rightCols(3) = inputs_.leftCols(3) * Eigen::Vector3d(-push * push, -shake * shake, -shake * shake).asDiagonal() / (dt * dt);
   }
 
   const AeroelasticModel& model() const { return model_; }

@@ -254,10 +254,10 @@ TEST(AeroelasticModel, VelocityAndAccelerationAreTheSlopesOfDisplacement) {
       // The same motion at every step size: turn of 0.05 s, mount moving with 3 Hz.
       const auto at = static_cast<Index>(std::round(0.02 / dt)), rise = static_cast<Index>(std::round(0.05 / dt));
       const Motion motion = motion_of(turn(samples, at, rise, 0.03), dt);
-      MatrixXd input(shaken ? samples + 1 : 0, shaken ? 2 : 0);
+      MatrixXd input = MatrixXd::Zero(shaken ? samples + 1 : 0, shaken ? 4 : 0);  // straight between samples
       for (Index k = 0; k < input.rows(); ++k) {
         const double t = 2 * pi * 3 * dt * static_cast<double>(k);
-        input.row(k) << 0.01 * (1 - std::cos(t)), 0.01 * 2 * pi * 3 * std::sin(t);
+        input.row(k).head(2) << 0.01 * (1 - std::cos(t)), 0.01 * 2 * pi * 3 * std::sin(t);
       }
       return outputs(s, at_rest(s), samples, dt, motion.jerk, input);
     };
@@ -414,8 +414,11 @@ TEST(ModalModel, RatesAndAccelerationsOfSensorsAreSlopes) {
   c.force = true;
   constexpr double dt = 1e-4;
   constexpr Index n = 2000;
-  MatrixXd force(n + 1, 1);
-  for (Index k = 0; k <= n; ++k) force(k, 0) = 1 - std::cos(20 * dt * static_cast<double>(k));
+  MatrixXd force(n + 1, 2);
+  for (Index k = 0; k <= n; ++k) {
+    const double wave = std::cos(20 * dt * static_cast<double>(k));
+    force.row(k) << 1 - wave, 400 * wave;  // and its second derivative
+  }
   const LinearSystem s = model.system(c, model.start_values(), every_channel);
   const MatrixXd y = drive(s, exact_step(s, dt), DualMatrix(MatrixXd::Zero(4, 1)), n, {}, force, Partials::none).output;
   const auto slope = [&](Index column) -> VectorXd { return (y.col(column).tail(n - 2) - y.col(column).head(n - 2)) / (2 * dt); };

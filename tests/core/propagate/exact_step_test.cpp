@@ -79,6 +79,28 @@ TEST(ExactStep, OfAnOscillatorUnderALinearInputIsItsClosedForm) {
   EXPECT_NEAR(next[1], expected[1], tolerance * omega);
 }
 
+TEST(ExactStep, OfAnOscillatorUnderASplineIsItsClosedForm) {
+  for (const double dt : {0.01, 0.5, 4.0}) {
+    const double omega = 30, zeta = 0.02;
+    const Vector4d force(2, -5, 7, -3);
+    LinearSystem s = oscillator(omega, zeta);
+    s.B = s.B.grown(5, 2);
+    s.curved = 1;
+    const auto value = [&](double t) { return force[0] + t * (force[1] + t * (force[2] + t * force[3])); };
+    const auto curvature = [&](double t) { return 2 * force[2] + 6 * t * force[3]; };
+    const MatrixXd input{{value(0), curvature(0)}, {value(dt), curvature(dt)}};
+    const ExactStep step = exact_step(s, dt);
+    VectorXd state = VectorXd::Zero(5);
+    state.head<2>() << 0.01, -0.2;
+    const VectorXd next = step.transition.value * state + step.input0.value * input.row(0).transpose() + step.input1.value * input.row(1).transpose();
+    const Eigen::Vector2d expected = closed_form(omega, zeta, force, state.head<2>(), dt);
+    const double size = 1 + input.cwiseAbs().maxCoeff() * dt * dt;
+    EXPECT_NEAR(next[0], expected[0], tolerance * size) << dt;
+    EXPECT_NEAR(next[1], expected[1], tolerance * size * omega) << dt;
+    for (const double share : {0.0, 0.3, 1.0}) EXPECT_NEAR(input_between(s, input, dt, 0, share, 0), value(share * dt), 1e-14 * size * std::abs(force.sum())) << dt;
+  }
+}
+
 TEST(ExactStep, WithoutMotionAndInputsHasNoColumnsForThem) {
   LinearSystem s = oscillator(30, 0.02);
   s.A = s.A.block(0, 0, 2, 2);
@@ -90,8 +112,8 @@ TEST(ExactStep, WithoutMotionAndInputsHasNoColumnsForThem) {
   EXPECT_EQ(step.transition.rows(), 2);
 }
 
-/// Any system: lags beside vibrations, two inputs, prescribed motion in the last three of seven states.
-LinearSystem any_system(double theta) {
+/// Any system: lags beside vibrations, two inputs, prescribed motion in the last three of seven states. `curved`: inputs that are splines.
+LinearSystem any_system(double theta, Index curved = 0) {
   std::mt19937_64 engine(7);
   std::normal_distribution<double> normal;
   const auto random = [&](Index rows, Index cols) { return MatrixXd(MatrixXd::NullaryExpr(rows, cols, [&] { return normal(engine); })); };
@@ -110,8 +132,10 @@ LinearSystem any_system(double theta) {
   change.topRows(4) = random(4, 2);
   s.B.value += theta * change;
   s.B.add_partial(0, change);
+  s.B = s.B.grown(7, 2 + curved);
   s.C = DualMatrix(MatrixXd::Identity(7, 7), 1);
-  s.D = DualMatrix(MatrixXd::Zero(7, 2), 1);
+  s.D = DualMatrix(MatrixXd::Zero(7, 2 + curved), 1);
+  s.curved = curved;
   s.motion = 4;
   return s;
 }
@@ -146,9 +170,9 @@ TEST(ExactStep, IsWhereRungeKuttaConvergesTo) {
 
 TEST(ExactStep, CarriesItsSlopes) {
   const double dt = 0.7;
-  const ExactStep here = exact_step(any_system(0), dt);
+  const ExactStep here = exact_step(any_system(0, 2), dt);
   const auto check = [&](auto part, const char* name) {
-    EXPECT_TRUE(test::is_slope([&](double h) { return part(exact_step(any_system(h), dt)).value; }, part(here).d(0), 1e-3)) << name;
+    EXPECT_TRUE(test::is_slope([&](double h) { return part(exact_step(any_system(h, 2), dt)).value; }, part(here).d(0), 1e-3)) << name;
   };
   check([](const ExactStep& s) { return s.transition; }, "transition");
   check([](const ExactStep& s) { return s.jerk; }, "jerk");

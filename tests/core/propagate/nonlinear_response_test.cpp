@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "core/effects/effect.h"
+#include "core/numerics/spline_curvature.h"
 #include "tests/support/sample_data.h"
 
 namespace unrig {
@@ -62,6 +63,37 @@ TEST(NonlinearResponse, AGapKeepsEnergyAndPeriod) {
     if (fine(k, 0) > 0 && fine(k + 1, 0) <= 0) crossings.push_back(dt * (static_cast<double>(k) + fine(k, 0) / (fine(k, 0) - fine(k + 1, 0))));
   ASSERT_GT(crossings.size(), static_cast<std::size_t>(periods));
   EXPECT_NEAR((crossings[periods] - crossings[0]) / periods / exact, 1, 1e-3) << "a loss of 1 % would change it by 0.1 %";
+}
+
+double minus(const double* z, const double*, double* slope, double*) {
+  *slope = -1;
+  return -*z;
+}
+
+/// Under a force that is a spline a spring that is a law does what it does in the linear system, but for what its own straight lines lose: the square of the steps.
+TEST(NonlinearResponse, FollowsASplineWithinASample) {
+  constexpr Index samples = 60;
+  const double stiffness = 0.5 * omega * omega, wide = 0.05;  // twelve samples a period of the force, four of the whole rig
+  LinearSystem linear;
+  linear.A = DualMatrix(MatrixXd{{0, 1}, {-omega * omega, -2}});
+  linear.B = DualMatrix(MatrixXd{{0, 0}, {1, 0}});
+  linear.C = DualMatrix(MatrixXd::Identity(2, 2));
+  linear.D = DualMatrix(MatrixXd::Zero(2, 2));
+  linear.curved = 1;
+  MatrixXd input(samples + 1, 2);
+  for (Index k = 0; k <= samples; ++k) input(k, 0) = std::sin(2 * static_cast<double>(k * k % 7));
+  input.col(1) = spline_curvature(input.col(0), wide);
+  const MatrixXd exact = drive(linear, exact_step(linear, wide), DualMatrix(MatrixXd::Zero(2, 1)), samples, {}, input, Partials::none).output;
+  const auto error = [&](Index steps) {
+    LinearSystem system = linear;
+    system.A.value(1, 0) += stiffness;
+    system.B = DualMatrix(MatrixXd{{0, 0, 0}, {1, 0, stiffness}});
+    system.D = DualMatrix(MatrixXd::Zero(2, 3));
+    system.feedback.push_back({Eigen::RowVector2d(1, 0), 0, 0, minus, nullptr, steps});
+    return (follow(system, step_to_follow(system, wide), VectorXd(), {Eigen::Vector2d::Zero(), {}, input, MatrixXd(2, 0), {}}, samples, Partials::none).output - exact).norm() / exact.norm();
+  };
+  EXPECT_NEAR(error(32) / error(64), 4, 0.1);
+  EXPECT_LT(error(64), 1e-3);
 }
 
 TEST(NonlinearResponse, TangentsOfALawOfStraightPiecesAreThoseOfItsResponse) {

@@ -57,7 +57,7 @@ TEST(InputNoise, MakesTheNoiseWhiteAsTheWholeCovarianceSays) {
   weight.col(0).segment(50, 10) *= 0.5;
   MatrixXd covariance = MatrixXd::Zero(2 * n, 2 * n);
   for (Index k = 0; k < n; ++k) {
-    MatrixXd input = MatrixXd::Zero(n + 1, 1);
+    MatrixXd input = MatrixXd::Zero(n + 1, 2);  // straight between samples, as noise is
     input(k, 0) = level;
     const VectorXd y = d.output(input);
     covariance += y * y.transpose();
