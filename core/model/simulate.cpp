@@ -222,6 +222,7 @@ SimulateResult simulate(const SimulateProblem& problem) {
   for (const Output& output : outputs) result.simulated.push_back(output.name);
   LinearSystem system = problem.model.system(conditions, problem.theta, result.simulated);
   for (DualMatrix* m : {&system.A, &system.B, &system.C, &system.D}) m->partial.clear();  // nobody asks for derivatives
+  for (Feedback& f : system.feedback) f.steps_per_sample *= problem.law_steps;
 
   result.run = run;
   MatrixXd reading = read_response(problem, system, conditions, result.beyond);

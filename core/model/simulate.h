@@ -25,6 +25,7 @@ struct SimulateProblem {
   std::optional<double> steady_normal_force;  ///< coefficient before the motion; without it, slope times the first angle
   Eigen::VectorXd signals = {};  ///< initial values of the effects' signals (LinearSystem::exogenous), in their units; empty: all zero
   Eigen::MatrixXd signal_steps = {};  ///< what they change by behind each sample, beside what the model makes of them, samples x signals; empty: nothing; not with jumps
+  Eigen::Index law_steps = 1;  ///< nonlinear laws are followed in so many times the steps that they ask for, as the fit was that they are from
 };
 
 struct SimulateResult {

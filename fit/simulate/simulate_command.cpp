@@ -154,6 +154,7 @@ ToSimulate simulate_problem(Rig rig, Run run, const std::optional<FittedRig>& fi
   if (fit && std::none_of(problem.model.parameters().begin(), problem.model.parameters().end(), is_fitted))
     throw InputError({fit->file, 0}, "no parameter of the rig " + rig.file, "wanted a fit of this rig", "Fit it, or leave --fit away.");
   problem.theta = fit ? theta_for(problem.model, *fit, problem.run.file, conditions_of(problem.run).onset_angle) : problem.model.start_values();
+  if (fit) problem.law_steps = fit->law_steps;
   if (fit)
     if (const FittedParameter* steady = fit->find(steady_name, problem.run.file)) problem.steady_normal_force = steady->value;
   if (table && table->slope && !rig.is_modal()) problem.theta[problem.model.index("normal_force_slope")] = *table->slope;
@@ -211,6 +212,7 @@ std::vector<std::string> recipe(const SimulateProblem& problem, const SimulateRe
   for (const std::string& beyond : result.beyond) lines.push_back("a guess: " + beyond);
   if (problem.steady_normal_force) lines.push_back(fmt::format("{} = {:.10g} 1", steady_name, *problem.steady_normal_force));
   if (problem.release_load) lines.push_back(fmt::format("released from {:.10g} N", *problem.release_load));
+  if (problem.law_steps > 1) lines.push_back(fmt::format("nonlinear laws followed in {} times the steps that they ask for, as by the fit", problem.law_steps));
   if (problem.pitch == PitchBetweenSamples::jumps) lines.emplace_back("the angle jumps between samples");
   return lines;
 }

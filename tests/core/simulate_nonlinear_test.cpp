@@ -21,7 +21,7 @@ using testing::HasSubstr;
 constexpr double mass = 2, frequency = 2.5, omega = 2 * pi * frequency, stiffness = mass * omega * omega;
 
 /// One mode whose gauge reads k x [N], let go from `load` [N], with an effect of these parameters at work.
-VectorXd decay(double damping_ratio, double load, double dt, double seconds, const std::string& effect, const std::vector<double>& parameters) {
+VectorXd decay(double damping_ratio, double load, double dt, double seconds, const std::string& effect, const std::vector<double>& parameters, Index law_steps = 1) {
   Rig rig;
   rig.file = "rig.toml";
   rig.modal = {{mass, frequency, damping_ratio, stiffness, "N"}};
@@ -35,6 +35,7 @@ VectorXd decay(double damping_ratio, double load, double dt, double seconds, con
   run.channels.push_back({"note", "1", "1", 1, VectorXd::Zero(static_cast<Index>(std::lround(seconds / dt)) + 1), 0});
   SimulateProblem problem{model, theta, run, {}, {}, {}};
   problem.release_load = load;
+  problem.law_steps = law_steps;
   return simulate(problem).run.channel("gauge").value;
 }
 
@@ -70,6 +71,14 @@ TEST(SimulateNonlinear, QuadraticDragMeetsRungeKutta) {
   const VectorXd with = decay(zeta, load, 2e-3, seconds, "quadratic-drag", {coefficient}), without = decay(zeta, load, 2e-3, seconds, "", {});
   EXPECT_LT(with.tail(400).cwiseAbs().maxCoeff(), 0.7 * without.tail(400).cwiseAbs().maxCoeff());
   EXPECT_GT(coarse, 0) << "two integrators, not one";
+}
+
+/// In twice as many steps a sample a law does what it does at twice the sampling rate.
+TEST(SimulateNonlinear, FollowsLawsInTheStepsOfAFit) {
+  const VectorXd finer = decay(0.01, 100, 4e-3, 2, "quadratic-drag", {8}, 2), faster = decay(0.01, 100, 2e-3, 2, "quadratic-drag", {8}), coarse = decay(0.01, 100, 4e-3, 2, "quadratic-drag", {8});
+  const VectorXd same = faster(Eigen::seqN(0, finer.size(), 2));
+  EXPECT_LT((finer - same).cwiseAbs().maxCoeff(), 1e-9);
+  EXPECT_GT((coarse - same).cwiseAbs().maxCoeff(), 1e-3);
 }
 
 TEST(SimulateNonlinear, DryFrictionTakesTheSameFromEveryCycle) {

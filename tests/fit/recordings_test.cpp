@@ -78,10 +78,12 @@ TEST(FitRecording, HysteresisOfBoucAndWenIsPredicted) {
   const AeroelasticModel model = model_of(problem.rig, problem.runs, problem.circulation, problem.effects);
   VectorXd theta = model.start_values();
   for (Index j = 0; j < theta.size(); ++j) theta[j] = parameter(result, model.parameters()[static_cast<std::size_t>(j)].name).value;
-  const VectorXd missed = reading - simulate({model, theta, twice, PitchBetweenSamples::spline, {}, {}}).run.channel("gauge").value.tail(period);
+  SimulateProblem test{model, theta, twice, PitchBetweenSamples::spline, {}, {}};
+  test.law_steps = result.law_steps;
+  const VectorXd missed = reading - simulate(test).run.channel("gauge").value.tail(period);
   const double left = rms(missed);
   RecordProperty("test_multisine", std::to_string(1e6 * left) + " um");
-  EXPECT_LT(left, 1.9e-5);
+  EXPECT_LT(left, 5e-7) << "2.4e-7 m with the parameters that the authors made it with, by another integrator";
 }
 
 TEST(FitRecording, WingSectionInHeaveAndPitch) {
