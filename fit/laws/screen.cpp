@@ -59,7 +59,8 @@ Port port_of(const RunResidual& run, const VectorXd& theta, ActsOn place) {
       if (model.parameters()[i].name == own[k].name) values[static_cast<Index>(i)] = theta[static_cast<Index>(k)];
   Port port{model.system(run.conditions(), values, {run.channels().front()}), {}};
   LinearSystem& s = port.system;
-  s = under_one_input(std::move(s), s.B.cols() - 1);
+  const Index last = s.B.cols() - 1;
+  s = under_one_input(std::move(s), last);
   const RowVectorXd shape = first_mode(model, s.coordinates);
   port.reads = MatrixXd::Zero(4, s.states());
   port.reads.row(0) = displacement_of(s, shape);
