@@ -69,6 +69,7 @@ void add_noise_colour(const FitResult& r, json& out) {
     json parts = json::array();
     for (Eigen::Index i = 0; i < one.colour.corner.size(); ++i) parts.push_back({{"corner", one.colour.corner[i]}, {"unit", "Hz"}, {"variance", one.colour.power[i]}});
     out["noise_colour"].push_back({{"channel", one.channel}, {"white", one.colour.white}, {"parts", parts}});
+    if (one.colour.falling.size() > 0) out["noise_colour"].back()["falling"] = std::vector<double>(one.colour.falling.begin(), one.colour.falling.end());
   }
 }
 
@@ -85,6 +86,11 @@ std::vector<ChannelColour> read_noise_colour(const json& in) {
       if (!(corner.back() > 0) || !(power.back() > 0)) throw std::invalid_argument("a part of \"noise_colour\" without a positive corner and variance");
     }
     if (!(one.colour.white > 0)) throw std::invalid_argument("a \"noise_colour\" without white noise");
+    const auto falling = item.value("falling", std::vector<double>());
+    constexpr std::size_t three = 3;
+    if (!(falling.empty() || falling.size() == three) || std::any_of(falling.begin(), falling.end(), [](double v) { return !(v >= 0); }))
+      throw std::invalid_argument("a \"noise_colour\" whose \"falling\" are not three variances of at least 0");
+    one.colour.falling = Eigen::Map<const Eigen::VectorXd>(falling.data(), static_cast<Eigen::Index>(falling.size()));
     one.colour.corner = Eigen::Map<const Eigen::VectorXd>(corner.data(), static_cast<Eigen::Index>(corner.size()));
     one.colour.power = Eigen::Map<const Eigen::VectorXd>(power.data(), static_cast<Eigen::Index>(power.size()));
     all.push_back(std::move(one));

@@ -59,7 +59,9 @@ std::string report(const FitResult& r, double least) {
   for (const ChannelColour& one : r.noise_colour) {
     std::string corners;
     for (const double corner : one.colour.corner) corners += fmt::format("{}{:.2g}", corners.empty() ? "" : ", ", corner);
-    line("noise colour", fmt::format("{}: {:.2g} % of its variance in parts that are correlated, with corners at {} Hz", one.channel, 100 * one.colour.power.sum() / one.colour.variance(), corners));
+    std::string shares = fmt::format("{}: {:.2g} % of its variance in parts that are correlated, with corners at {} Hz", one.channel, 100 * one.colour.power.sum() / one.colour.variance(), corners);
+    if (one.colour.falling.size() > 0) shares += fmt::format("; {:.2g} % falls towards half the sampling rate, as behind a filter against aliasing", 100 * one.colour.falling.sum() / one.colour.variance());
+    line("noise colour", shares);
   }
   if (!r.no_answer.empty()) text += "    NO TRUSTWORTHY ANSWER: " + r.no_answer + "\n";
 

@@ -3,6 +3,7 @@
 #include <Eigen/Eigenvalues>
 #include <Eigen/LU>
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <iterator>
 #include <numbers>
@@ -40,14 +41,52 @@ VectorXd corners_for(double rate, double duration) {
   return Eigen::Map<const VectorXd>(corners.data(), static_cast<Index>(corners.size()));
 }
 
-VectorXd poles(const VectorXd& corner, double dt) { return (-2 * std::numbers::pi * dt * corner.array()).exp(); }
+/// A part of noise, driven by white noise u of unit variance: n_k = s_k + direct u_k, s_{k+1} = pole s_k + drive u_k.
+struct Part {
+  double pole, drive, direct = 0;
+
+  double state_variance() const { return drive * drive / (1 - pole * pole); }
+  /// Spectrum over that of white noise of unit variance, at the sine of half the angle between samples.
+  double spectrum(double half) const {
+    const double last = drive - pole * direct;
+    return (std::pow(direct + last, 2) - 4 * direct * last * half * half) / (std::pow(1 - pole, 2) + 4 * pole * half * half);
+  }
+};
+
+constexpr std::array falling_corners{1.0 / 4, 3.0 / 8, 9.0 / 20};  // of the sampling rate: a filter against aliasing lets half of the spectrum through, or more
+
+/// The parts of colours with these corners, each of unit variance; the falling ones last.
+std::vector<Part> unit_parts(const VectorXd& corner, double dt) {
+  std::vector<Part> parts;
+  for (const double f : corner) {
+    const double pole = std::exp(-2 * std::numbers::pi * f * dt);
+    parts.push_back({pole, std::sqrt(1 - pole * pole)});
+  }
+  for (const double place : falling_corners) {
+    const double tangent = std::tan(std::numbers::pi * place), pole = (1 - tangent) / (1 + tangent), direct = std::sqrt((1 - pole) / 2);
+    parts.push_back({pole, (1 + pole) * direct, direct});
+  }
+  return parts;
+}
+
+/// Those that a colour has.
+std::vector<Part> parts_of(const NoiseColour& colour, double dt) {
+  std::vector<Part> parts = unit_parts(colour.corner, dt), own;
+  VectorXd power = VectorXd::Zero(static_cast<Index>(parts.size()));
+  power.head(colour.power.size()) = colour.power;
+  power.segment(colour.power.size(), colour.falling.size()) = colour.falling;
+  for (std::size_t i = 0; i < parts.size(); ++i)
+    if (const double size = std::sqrt(power[static_cast<Index>(i)]); size > 0) own.push_back({parts[i].pole, size * parts[i].drive, size * parts[i].direct});
+  return own;
+}
 
 /// Expected periodogram over n samples of a part of unit variance, on the lines between the mean and the last: the transform of its covariance under the triangle of what the samples have in
 /// common (A. M. Sykulski et al., Biometrika 106 (2019) 251).
-VectorXd expected_periodogram(double pole, Index n) {
+VectorXd expected_periodogram(const Part& part, Index n) {
   VectorXd covariance(n);
-  double correlation = 1;
-  for (Index lag = 0; lag < n; ++lag, correlation *= pole) covariance[lag] = (1 - static_cast<double>(lag) / static_cast<double>(n)) * correlation;
+  covariance[0] = 1;
+  double correlation = part.pole * part.state_variance() + part.drive * part.direct;
+  for (Index lag = 1; lag < n; ++lag, correlation *= part.pole) covariance[lag] = (1 - static_cast<double>(lag) / static_cast<double>(n)) * correlation;
   return (2 * fourier(covariance).real().array() - 1).segment(1, (n - 1) / 2);
 }
 
@@ -75,9 +114,9 @@ std::vector<Stretch> periodograms(const RestResidual& residual, const VectorXd& 
   std::vector<Stretch> all;
   for (const Interval& s : stretches_of(residual.value)) {
     const Index n = s.length(), lines = (n - 1) / 2;
-    Stretch stretch{fourier(VectorXd(residual.value.segment(s.first, n))).cwiseAbs2().segment(1, lines) / static_cast<double>(n), MatrixXd::Ones(lines, corner.size() + 1)};
-    const VectorXd pole = poles(corner, residual.dt);
-    for (Index i = 0; i < corner.size(); ++i) stretch.basis.col(i + 1) = expected_periodogram(pole[i], n);
+    const std::vector<Part> parts = unit_parts(corner, residual.dt);
+    Stretch stretch{fourier(VectorXd(residual.value.segment(s.first, n))).cwiseAbs2().segment(1, lines) / static_cast<double>(n), MatrixXd::Ones(lines, static_cast<Index>(parts.size()) + 1)};
+    for (std::size_t i = 0; i < parts.size(); ++i) stretch.basis.col(static_cast<Index>(i) + 1) = expected_periodogram(parts[i], n);
     all.push_back(std::move(stretch));
   }
   return all;
@@ -111,8 +150,10 @@ struct Groups {
   VectorXd white() const { return VectorXd::Constant(power.size(), size(VectorXd::Ones(power.size()))); }
 };
 
-/// Powers of the columns of the basis with the greatest likelihood.
-VectorXd most_likely_powers(const Groups& lines) {
+/// Powers of the first columns of the basis with the greatest likelihood; none of the others.
+VectorXd most_likely_powers(Groups lines, Index columns) {
+  const Index all = lines.basis.cols();
+  lines.basis.conservativeResize(Eigen::NoChange, columns);
   constexpr int most = 3000;
   constexpr double precise = 1e-3;  // of the logarithm, over ten steps
   VectorXd powers = VectorXd::Constant(lines.basis.cols(), lines.white()[0] / static_cast<double>(lines.basis.cols()));
@@ -127,6 +168,7 @@ VectorXd most_likely_powers(const Groups& lines) {
     const VectorXd pull = lines.basis.transpose() * weight.cwiseProduct(lines.power).cwiseQuotient(spectrum), push = lines.basis.transpose() * weight;
     powers = powers.cwiseProduct(pull.cwiseQuotient(push));
   }
+  powers.conservativeResizeLike(VectorXd::Zero(all));
   return powers;
 }
 
@@ -153,20 +195,23 @@ double far_from_white(const VectorXd& relative, double chance) {
 }  // namespace
 
 double NoiseColour::density(double frequency, double dt) const {
-  const Eigen::ArrayXd pole = poles(corner, dt), one_minus = 1 - pole;
   const double half = std::sin(std::numbers::pi * frequency * dt);
-  return 2 * dt * (white + (power.array() * one_minus * (1 + pole) / (one_minus.square() + 4 * pole * half * half)).sum());
+  double sum = white;
+  for (const Part& part : parts_of(*this, dt)) sum += part.spectrum(half);
+  return 2 * dt * sum;
 }
 
 namespace {
 
-/// All parts, none smaller than a spectrum of a hundredth of the white one's: what a few lines said no of may be asked again.
+/// All parts, none smaller than a spectrum of a hundredth of the white one's: what a few lines said no of may be asked again. Of falling ones those that are larger.
 NoiseColour colour_from(const VectorXd& corner, const VectorXd& powers, double dt) {
   constexpr double least = 1e-6, hardly = 0.01;
   NoiseColour colour;
   colour.white = std::max(powers[0], least * powers.sum());
   colour.corner = corner;
-  colour.power = powers.tail(corner.size()).cwiseMax(hardly * colour.white * std::numbers::pi * dt * corner);  // a part's spectrum is power / (pi corner dt) below its corner
+  colour.power = powers.segment(1, corner.size()).cwiseMax(hardly * colour.white * std::numbers::pi * dt * corner);  // a part's spectrum is power / (pi corner dt) below its corner
+  const auto falling = powers.tail(falling_corners.size());
+  if ((falling.array() > hardly * colour.white).any()) colour.falling = (falling.array() > hardly * colour.white).select(falling, 0);
   return colour;
 }
 
@@ -206,9 +251,15 @@ std::optional<CommonColour> colour_in_common(const std::vector<RestResidual>& re
     std::move(own.begin(), own.end(), std::back_inserter(stretches));
   }
   const Groups lines(stretches);
-  const VectorXd powers = most_likely_powers(lines);
-  const double gained = 2 * (lines.log_likelihood(lines.basis * powers) - of_white);
-  if (gained < once_in_a_thousand(static_cast<double>(corner.size()))) return std::nullopt;
+  const auto log_likelihood = [&](const VectorXd& powers) { return lines.log_likelihood(lines.basis * powers); };
+  const auto is_more = [](double gained, Index parts) { return 2 * gained > once_in_a_thousand(static_cast<double>(parts)); };
+  const Index correlated = corner.size(), all = lines.basis.cols() - 1;
+  VectorXd powers = most_likely_powers(lines, 1 + correlated);
+  const VectorXd with_falling = most_likely_powers(lines, 1 + all);
+  const bool any = is_more(log_likelihood(powers) - of_white, correlated);
+  const double gained = log_likelihood(with_falling) - (any ? log_likelihood(powers) : of_white);
+  if (is_more(gained, any ? all - correlated : all)) powers = with_falling;
+  else if (!any) return std::nullopt;
   CommonColour common{colour_from(corner, powers, longest.dt)};
   const double chance = 1e-3 / (2 * static_cast<double>(stretches.size()));  // Bonferroni: of two tests each
   for (std::size_t i = 0; i < stretches.size(); ++i)
@@ -237,30 +288,36 @@ std::optional<NoiseColour> colour_of_most(std::vector<RestResidual> residuals) {
 std::optional<NoiseColour> sized(const NoiseColour& colour, const RestResidual& residual) {
   const std::vector<Stretch> stretches = periodograms(residual, colour.corner);
   if (stretches.empty()) return std::nullopt;
-  VectorXd powers(1 + colour.power.size());
-  powers << colour.white, colour.power;
   const Groups lines(stretches);
+  VectorXd powers = VectorXd::Zero(lines.basis.cols());
+  powers[0] = colour.white;
+  powers.segment(1, colour.power.size()) = colour.power;
+  powers.segment(1 + colour.power.size(), colour.falling.size()) = colour.falling;
   return colour_from(colour.corner, lines.size(lines.basis * powers) * powers, residual.dt);
 }
 
-WhiteningFilter::WhiteningFilter(const NoiseColour& colour, double dt) : pole_(poles(colour.corner, dt)) {
-  const Index m = pole_.size();
-  const VectorXd drive = colour.power.array() * (1 - pole_.array().square());
-  const MatrixXd stationary = colour.power.asDiagonal();
+WhiteningFilter::WhiteningFilter(const NoiseColour& colour, double dt) {
+  const std::vector<Part> parts = parts_of(colour, dt);
+  const auto m = static_cast<Index>(parts.size());
+  const auto of_parts = [&](const auto& of) { return VectorXd::NullaryExpr(m, [&](Index i) { return of(parts[static_cast<std::size_t>(i)]); }).eval(); };
+  pole_ = of_parts([](const Part& p) { return p.pole; });
+  const VectorXd drive = of_parts([](const Part& p) { return p.drive; }), direct = of_parts([](const Part& p) { return p.direct; });
+  const double at_once = colour.white + direct.squaredNorm();
+  const MatrixXd stationary = of_parts([](const Part& p) { return p.state_variance(); }).asDiagonal();
   MatrixXd known = stationary;  // covariance of the parts before each sample, given those before it
   double innovation = 0;
   constexpr double settled = 1e-13;
   constexpr int most = 1000000;
   for (int i = 0; i < most; ++i) {
-    const VectorXd reach = known.rowwise().sum();
-    innovation = reach.sum() + colour.white;
-    MatrixXd next = pole_.asDiagonal() * (known - reach * reach.transpose() / innovation) * pole_.asDiagonal();
-    next.diagonal() += drive;
+    innovation = known.sum() + at_once;
+    gain_ = (pole_.cwiseProduct(known.rowwise().sum()) + drive.cwiseProduct(direct)) / innovation;
+    MatrixXd next = pole_.asDiagonal() * known * pole_.asDiagonal();
+    next -= innovation * gain_ * gain_.transpose();
+    next.diagonal() += drive.cwiseAbs2();
     const bool done = (next - known).norm() <= settled * next.norm();
     known = 0.5 * (next + next.transpose());
     if (done) break;
   }
-  gain_ = pole_.cwiseProduct(known.rowwise().sum()) / innovation;
   feed_ = -gain_ * VectorXd::Ones(m).transpose();
   feed_.diagonal() += pole_;
   g_ = 1 + (gain_.array() / (1 - pole_.array())).sum();

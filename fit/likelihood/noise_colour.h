@@ -12,17 +12,22 @@ namespace unrig {
 ///
 ///   n_{k+1} = a n_k + v_k,  a = exp(-2 pi f dt),   spectrum  c (1 - a^2) / (1 - 2 a cos omega + a^2)  at omega radians per sample.
 ///
-/// Few of them make 1/f noise over the decades of a record (one in each decade: M. S. Keshner, Proc. IEEE 70 (1982) 212). Their spectra only fall: neither a line nor a resonance is
-/// among them, so that physics that was left out does not pass for noise.
+/// Few of them make 1/f noise over the decades of a record (one in each decade: M. S. Keshner, Proc. IEEE 70 (1982) 212). Beside them, falling parts: noise that a filter against aliasing has
+/// kept from the end of the spectrum, white noise through a Butterworth filter of first order,
+///
+///   m_{k+1} = b m_k + u_{k+1} + u_k,  b = (1 - tan(pi f dt)) / (1 + tan(pi f dt)),   spectrum  c (1 - b) (1 + cos omega) / (1 - 2 b cos omega + b^2).
+///
+/// All spectra only fall: neither a line nor a resonance is among them, so that physics that was left out does not pass for noise.
 struct NoiseColour {
-  Eigen::VectorXd corner;  ///< f of each part [Hz]
-  Eigen::VectorXd power;   ///< c, variance of each part [square of the residual's unit]
-  double white = 0;        ///< variance of w
+  Eigen::VectorXd corner;     ///< f of each part [Hz]
+  Eigen::VectorXd power;      ///< c, variance of each part [square of the residual's unit]
+  double white = 0;           ///< variance of w
+  Eigen::VectorXd falling{};  ///< variance of each falling part, whose corners are at 1/4, 3/8 and 9/20 of the sampling rate; or empty
 
   /// Variance of the whole.
-  double variance() const { return white + power.sum(); }
+  double variance() const { return white + power.sum() + falling.sum(); }
   /// Of noise that is so many times as large.
-  NoiseColour times(double size) const { return {corner, size * size * power, size * size * white}; }
+  NoiseColour times(double size) const { return {corner, size * size * power, size * size * white, size * size * falling}; }
   /// Its one-sided spectrum, of samples `dt` [s] apart, at a frequency [Hz]; per Hz.
   double density(double frequency, double dt) const;
 };
@@ -41,8 +46,8 @@ struct RestResidual {
 /// The colour that residuals have in common; none where white noise of one variance in each of them explains them.
 ///
 /// Whittle's likelihood of the periodograms of stretches without left-out samples is greatest. The powers are found by the multiplicative steps of C. Fevotte, N. Bertin and J.-L. Durrieu,
-/// Neural Comput. 21 (2009) 793, for the distance of Itakura and Saito. Colour counts where twice the logarithm of its likelihood over white noise's has a probability below 1e-3 in white noise,
-/// and where what the colour leaves of each stretch is white (Bartlett's test, and Fisher's of the largest line, at the same level, corrected for their number).
+/// Neural Comput. 21 (2009) 793, for the distance of Itakura and Saito. Colour counts where twice the logarithm of its likelihood over white noise's has a probability below 1e-3 in white noise
+/// (falling parts: over the likelihood without them), and where what the colour leaves of each stretch is white (Bartlett's test, and Fisher's of the largest line, at the same level, corrected for their number).
 std::optional<NoiseColour> colour_of(const std::vector<RestResidual>& residuals);
 
 /// The colour that most residuals have in common, half of them at least: the one farthest from white behind it is left out, one at a time, until colour_of has an answer.
@@ -53,7 +58,7 @@ std::optional<NoiseColour> sized(const NoiseColour& colour, const RestResidual& 
 
 /// The filter that makes such noise white: its innovations, from the steady Kalman filter of the parts (B. D. O. Anderson and J. B. Moore, Optimal Filtering (1979), section 9.2),
 ///
-///   s_{k+1} = F s_k + K e_k,   white_k = g (e_k - h s_k),   F = diag(a) - K h,  h = [1 .. 1],
+///   s_{k+1} = F s_k + K e_k,   white_k = g (e_k - h s_k),   F = diag(poles) - K h,  h = [1 .. 1],
 ///
 /// with g so that it leaves a constant alone. The white noise has the standard deviation `sigma`.
 class WhiteningFilter {

@@ -57,6 +57,7 @@ class GrowingTrust {
       smoothers_.emplace_back(joint_.runs()[r], parameters_);
       samples_ += static_cast<double>(smoothers_.back().samples());
     }
+    begun_ = values();
   }
 
   static constexpr int first_levels = 3, trusted_levels = 5, all_levels = 9;
@@ -134,7 +135,7 @@ class GrowingTrust {
     }
   }
 
-  /// One Gauss-Newton step of all trajectories and, where asked, of theta: by half of itself or so, and to twice or half of itself at most.
+  /// One Gauss-Newton step of all trajectories and, where asked, of theta: by half of its size or so.
   void step(bool move) {
     const auto count = static_cast<Index>(free_.size()), runs = static_cast<Index>(decays_.size());
     MatrixXd rows = MatrixXd::Zero(count * (runs + 1), count);
@@ -148,17 +149,31 @@ class GrowingTrust {
     if (move && count > 0) {
       constexpr double share = 0.5, hardly = 1e-9;
       const VectorXd now = values();
-      for (Index i = 0; i < count; ++i) rows(count * runs + i, i) = now[i] != 0 ? 1 / (share * std::abs(now[i])) : hardly * rows.col(i).norm() + 1e-300;
+      const VectorXd size = sizes(now);
+      for (Index i = 0; i < count; ++i) rows(count * runs + i, i) = size[i] > 0 ? 1 / (share * size[i]) : hardly * rows.col(i).norm() + 1e-300;
       set(within_reach(now, now + rows.colPivHouseholderQr().solve(right)));
       change = values() - now;
     }
     in_parallel(decays_.size(), [&](std::size_t d) { smoothers_[d].step(change); });
   }
 
+  Effect::Band bounds(Index i, double now) const { return bounds_at(joint_.model(), joint_.unknowns()[free_[static_cast<std::size_t>(i)]].parameter, now); }
+
+  /// What theta is told in units of: itself; of what may have either sign at least what it began with, for on its way through zero it has none.
+  VectorXd sizes(const VectorXd& now) const {
+    VectorXd size = now.cwiseAbs();
+    for (Index i = 0; i < now.size(); ++i)
+      if (bounds(i, now[i]).first < 0) size[i] = std::max(size[i], std::abs(begun_[i]));
+    return size;
+  }
+
+  /// To twice or half of itself at most; what may have either sign by its size.
   VectorXd within_reach(const VectorXd& now, VectorXd then) const {
+    const VectorXd size = sizes(now);
     for (Index i = 0; i < now.size(); ++i) {
-      const auto [lower, upper] = bounds_at(joint_.model(), joint_.unknowns()[free_[static_cast<std::size_t>(i)]].parameter, now[i]);
-      if (now[i] > 0) then[i] = std::clamp(then[i], now[i] / 2, 2 * now[i]);
+      const auto [lower, upper] = bounds(i, now[i]);
+      if (lower < 0 && size[i] > 0) then[i] = std::clamp(then[i], now[i] - size[i], now[i] + size[i]);
+      else if (now[i] > 0) then[i] = std::clamp(then[i], now[i] / 2, 2 * now[i]);
       then[i] = std::clamp(then[i], lower, upper);
       if (!std::isfinite(then[i])) then[i] = now[i];
     }
@@ -184,6 +199,7 @@ class GrowingTrust {
   std::vector<Index> parameters_;
   std::vector<LawSmoother> smoothers_;
   std::vector<VectorXd> sigma_, linear_;
+  VectorXd begun_;  ///< theta
   double samples_ = 0, left_ = INFINITY;
   int level_ = 0;
   bool gave_up_ = false;

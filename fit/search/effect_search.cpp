@@ -427,7 +427,6 @@ bool follow_nonlinear(const FitProblem& problem, Trial& trial, const Trial& base
     }
     if (fit_decays_first(trial, base, true)) fit_fully(trial, 2);
     if (!(trial.excess() < guessed.excess())) trial = std::move(guessed);
-    if (!(trial.excess() < half_of_it * base.excess())) fit_from_first_guesses(problem, trial);  // from where that has led, as in a fit
     return true;
   }
   trial.ruled_out = !fit_decays_first(trial, base);

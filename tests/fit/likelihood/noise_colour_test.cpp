@@ -5,9 +5,11 @@
 #include <Eigen/Cholesky>
 #include <Eigen/LU>
 #include <Eigen/QR>
+#include <array>
 #include <cmath>
 #include <numbers>
 #include <random>
+#include <vector>
 
 #include "core/numerics/spectrum.h"
 #include "core/propagate/response.h"
@@ -23,7 +25,18 @@ constexpr double dt = 0.002;
 
 NoiseColour three_parts() { return {VectorXd{{0.3, 4, 40}}, VectorXd{{2, 0.5, 0.1}}, 0.7}; }
 
-/// Sums of independent first-order processes, sample by sample: nothing of the filter is in it.
+/// The same behind a filter against aliasing, of which little is white.
+NoiseColour behind_a_filter() { return {VectorXd{{0.3, 4}}, VectorXd{{2, 0.5}}, 0.1, VectorXd{{0.4, 0.3, 0.6}}}; }
+
+/// Sum over the steps of white noise behind which a falling part follows it: 1, 1 + b, b (1 + b), ...
+std::vector<double> answer_of_falling(std::size_t which, std::size_t steps) {
+  const double tangent = std::tan(std::numbers::pi * std::array{0.25, 0.375, 0.45}.at(which)), b = (1 - tangent) / (1 + tangent);
+  std::vector<double> answer{1};
+  for (double next = 1 + b; answer.size() < steps; next *= b) answer.push_back(next);
+  return answer;
+}
+
+/// Sums of independent processes, sample by sample: nothing of the filter is in it.
 VectorXd noise_of(const NoiseColour& colour, Index samples, unsigned seed) {
   std::mt19937_64 random(seed);
   std::normal_distribution<double> normal;
@@ -36,6 +49,15 @@ VectorXd noise_of(const NoiseColour& colour, Index samples, unsigned seed) {
       part = pole * part + size * std::sqrt(1 - pole * pole) * normal(random);
     }
   }
+  for (Index i = 0; i < colour.falling.size(); ++i) {
+    constexpr Index before = 60;  // what b has to that power is none
+    const std::vector<double> answer = answer_of_falling(static_cast<std::size_t>(i), before);
+    double power = 0;
+    for (const double a : answer) power += a * a;
+    const VectorXd u = VectorXd::NullaryExpr(samples + before, [&] { return normal(random); });
+    for (Index k = 0; k < samples; ++k)
+      for (Index j = 0; j < before; ++j) noise[k] += std::sqrt(colour.falling[i] / power) * answer[static_cast<std::size_t>(j)] * u[k + before - j];
+  }
   return noise;
 }
 
@@ -44,12 +66,22 @@ MatrixXd covariance_of(const NoiseColour& colour, Index samples) {
   for (Index i = 0; i < colour.corner.size(); ++i)
     for (Index a = 0; a < samples; ++a)
       for (Index b = 0; b < samples; ++b) covariance(a, b) += colour.power[i] * std::exp(-2 * std::numbers::pi * colour.corner[i] * dt * std::abs(static_cast<double>(a - b)));
+  for (Index i = 0; i < colour.falling.size(); ++i) {
+    const std::vector<double> answer = answer_of_falling(static_cast<std::size_t>(i), static_cast<std::size_t>(2 * samples));
+    VectorXd at_lag = VectorXd::Zero(samples);
+    for (Index lag = 0; lag < samples; ++lag)
+      for (std::size_t j = 0; j + static_cast<std::size_t>(lag) < answer.size(); ++j) at_lag[lag] += answer[j] * answer[j + static_cast<std::size_t>(lag)];
+    for (Index a = 0; a < samples; ++a)
+      for (Index b = 0; b < samples; ++b) covariance(a, b) += colour.falling[i] * at_lag[std::abs(a - b)] / at_lag[0];
+  }
   return covariance;
 }
 
 /// Behind the filter, with the noise's own start where its prior and the readings put it: chi-square and determinant are those of the whole covariance.
-TEST(WhiteningFilter, SaysWhatTheWholeCovarianceSays) {
-  const NoiseColour colour = three_parts();
+class WhiteningFilterOf : public testing::TestWithParam<NoiseColour> {};
+
+TEST_P(WhiteningFilterOf, SaysWhatTheWholeCovarianceSays) {
+  const NoiseColour colour = GetParam();
   const WhiteningFilter filter(colour, dt);
   constexpr Index n = 300;
   const MatrixXd covariance = covariance_of(colour, n);
@@ -77,13 +109,13 @@ TEST(WhiteningFilter, SaysWhatTheWholeCovarianceSays) {
   }
 }
 
-TEST(WhiteningFilter, LeavesAConstantAlone) {
-  const WhiteningFilter filter(three_parts(), dt);
+TEST_P(WhiteningFilterOf, LeavesAConstantAlone) {
+  const WhiteningFilter filter(GetParam(), dt);
   EXPECT_LT((filter.filtered(VectorXd::Constant(50, 2.5)).array() - 2.5).abs().maxCoeff(), 1e-10);
 }
 
-TEST(NoiseColour, ItsDensityIsTheMeanPeriodogramAndHoldsTheVariance) {
-  const NoiseColour colour = three_parts();
+TEST_P(WhiteningFilterOf, ItsDensityIsTheMeanPeriodogramAndHoldsTheVariance) {
+  const NoiseColour colour = GetParam();
   constexpr Index lines = 1 << 17;  // spaced by a hundredth of the lowest corner
   const double spacing = 0.5 / dt / lines;
   double sum = 0;
@@ -98,6 +130,8 @@ TEST(NoiseColour, ItsDensityIsTheMeanPeriodogramAndHoldsTheVariance) {
     EXPECT_NEAR(mean / colour.density(static_cast<double>(k) / (samples * dt), dt), 1, 0.06) << k;
   }
 }
+
+INSTANTIATE_TEST_SUITE_P(Colours, WhiteningFilterOf, testing::Values(three_parts(), behind_a_filter()));
 
 /// White noise is called coloured once in a thousand, and the likelihood of powers that may not be negative is less than the threshold's chi-square.
 TEST(NoiseColour, IsSeldomSeenInWhiteNoise) {
@@ -126,6 +160,35 @@ TEST(NoiseColour, IsFoundWithItsSize) {
     // Below 1 Hz some ten lines tell it, each to 100 %: 30 %.
     for (const double f : {0.5, 2.0, 10.0, 50.0, 200.0}) EXPECT_NEAR(std::log(spectrum(*found, f) / spectrum(truth, f)), 0, 0.5) << seed << " at " << f << " Hz";
     EXPECT_NEAR(std::log(spectrum(*found, 200) / spectrum(truth, 200)), 0, 0.08) << "thousands of lines";
+  }
+}
+
+/// White noise taken at so many times the rate and decimated behind a filter of a windowed sinc, as converters do: its spectrum is flat, and half of that at half the sampling rate.
+VectorXd decimated(Index samples, unsigned seed) {
+  constexpr Index times = 4, taps = 41;
+  VectorXd filter(taps);
+  for (Index j = 0; j < taps; ++j) {
+    const double at = std::numbers::pi * (static_cast<double>(j) - 0.5 * (taps - 1)) / times, window = 0.54 - 0.46 * std::cos(2 * std::numbers::pi * static_cast<double>(j) / (taps - 1));
+    filter[j] = window * (at == 0 ? 1 : std::sin(at) / at);
+  }
+  filter /= filter.norm();
+  std::mt19937_64 random(seed);
+  std::normal_distribution<double> normal;
+  const VectorXd white = VectorXd::NullaryExpr(times * samples + taps, [&] { return normal(random); });
+  return VectorXd::NullaryExpr(samples, [&](Index k) { return white.segment(times * k, taps).dot(filter); });
+}
+
+TEST(NoiseColour, BehindAFilterAgainstAliasingIsFound) {
+  constexpr Index samples = 8192, lines = 401;
+  for (const unsigned seed : {1u, 2u, 3u, 4u}) {
+    const VectorXd noise = decimated(samples, seed);
+    const std::optional<NoiseColour> found = colour_of({{noise, dt}});
+    ASSERT_TRUE(found) << seed;
+    ASSERT_GT(found->falling.size(), 0) << seed;
+    EXPECT_NEAR(found->variance(), noise.squaredNorm() / samples, 0.03) << seed;
+    const VectorXd power = 2 * dt / static_cast<double>(samples) * fourier(noise).cwiseAbs2();
+    for (const Index k : {300, 1500, 2500, 3000, 3800})  // 401 lines: 5 %; the fall is steeper than that of any part
+      EXPECT_NEAR(power.segment(k - lines / 2, lines).mean() / found->density(static_cast<double>(k) / (samples * dt), dt), 1, 0.2) << seed << " at line " << k;
   }
 }
 
