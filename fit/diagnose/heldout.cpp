@@ -30,7 +30,9 @@ double nearest_value(const JointProblem& fitted, const Unknown& wanted, double o
 HeldoutResidual predict_heldout(const Arrival& arrival, const Run& run) {
   const auto windows = motion_windows(run);
   std::vector<RunResidual> one;
-  one.emplace_back(*arrival.model, run, windows);
+  RunOptions begins;
+  begins.free_memories = run.kind == RunKind::forced || run.kind == RunKind::moved;
+  one.emplace_back(*arrival.model, run, windows, begins);
   JointProblem joint(*arrival.model, std::move(one));
   for (Unknown& u : joint.unknowns()) {
     u.held = u.run < 0;

@@ -8,6 +8,7 @@
 
 #include "core/run/bad_readings.h"
 #include "core/model/run_inputs.h"
+#include "core/propagate/memory.h"
 #include "core/run/run_limits.h"
 #include "fit/likelihood/run_linearised.h"
 
@@ -173,6 +174,8 @@ RunResidual::RunResidual(const AeroelasticModel& model, const Run& run, std::vec
   if (run.kind != RunKind::step) {
     for (Index i = 0; i < system.free_states(); ++i) free_.push_back(i);
     free_.insert(free_.end(), system.settling.begin(), system.settling.end());
+    for (Index i = 0; options.free_memories && i < static_cast<Index>(system.feedback.size()); ++i)
+      if (const Index memory = memory_of(system, i); memory >= 0) free_.push_back(memory);
   }
   free_.insert(free_.end(), system.exogenous.begin(), system.exogenous.end());
   states_ = system.states();

@@ -28,6 +28,7 @@ struct Rotated;
 struct RunOptions {
   Eigen::Index horizon = 0;  ///< samples after the onset (first motion, else the first sample) that count; 0: all of them
   std::optional<Conditions> conditions = {};  ///< those of the whole record, of a run that is a part of one; none: its own
+  bool free_memories = false;  ///< whether the memories of laws begin anyhow, as in a record that was begun in full swing; otherwise at zero
 };
 
 /// One run against the model: residuals of all fitted channels in units of their own noise, with everything that enters linearly solved for.

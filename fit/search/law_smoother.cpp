@@ -9,6 +9,7 @@
 #include "core/numerics/triangularise.h"
 #include "core/numerics/work.h"
 #include "core/propagate/feedback_force.h"
+#include "core/propagate/memory.h"
 
 namespace unrig {
 using Eigen::Index;
@@ -95,14 +96,6 @@ void LawSmoother::look_at_laws(const VectorXd& theta) {
   for (Index k = 0; k < samples_; ++k) answer_at(k, theta);
 }
 
-/// The state that law `i` is the rate of and nothing else drives; -1 where it is a force.
-Index LawSmoother::memory_of(Index i) const {
-  const VectorXd drives = system_.B.value.col(system_.B.cols() - laws_ + i);
-  Index memory = 0;
-  drives.cwiseAbs().maxCoeff(&memory);
-  return drives == VectorXd::Unit(states_, memory) && system_.A.value.row(memory).isZero(0) ? memory : -1;
-}
-
 /// Memories along the trajectory as their laws have them, by the trapezoidal rule: no disturbance acts on them, and about a memory that has not been followed its law has slopes that lead astray.
 void LawSmoother::follow_memories(const VectorXd& theta) {
   if (arguments_.accelerations) return;
@@ -110,7 +103,7 @@ void LawSmoother::follow_memories(const VectorXd& theta) {
   constexpr double arrived = 1e-9;
   const Index given = system_.B.cols() - laws_;
   for (Index i = 0; i < laws_; ++i) {
-    const Index memory = memory_of(i);
+    const Index memory = memory_of(system_, i);
     if (memory < 0) continue;
     const Feedback& f = system_.feedback[static_cast<std::size_t>(i)];
     const auto own = Eigen::seqN(arguments_.first[static_cast<std::size_t>(i)], f.sees.rows());

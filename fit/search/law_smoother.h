@@ -56,7 +56,6 @@ class LawSmoother {
   void prepare(const Eigen::VectorXd& theta);
   std::vector<Eigen::Index> laws_that_show() const;
   void look_at_laws(const Eigen::VectorXd& theta);
-  Eigen::Index memory_of(Eigen::Index i) const;
   void follow_memories(const Eigen::VectorXd& theta);
   Eigen::MatrixXd moved_by_theta() const;
   void write_step(Eigen::Index k, const Eigen::Ref<const Eigen::MatrixXd>& moved);

@@ -10,6 +10,7 @@
 #include "fit/diagnose/diagnose.h"
 #include "fit/fit.h"
 #include "fit/search/effect_search.h"
+#include "tests/support/band.h"
 
 namespace unrig {
 namespace {
@@ -129,15 +130,20 @@ TEST(HysteresisOfADrivenRun, IsFollowedFromTheRigWithoutIt) {
   }
 }
 
-/// No candidate is named; the run is driven, so that no decay tells of the law. The kinks of the force may remain.
+/// No candidate is named; the run is driven, so that no decay tells of the law. The kinks of the force may remain. What was not fitted is recorded in full swing.
 TEST(HysteresisOfADrivenRun, IsNamedByADiagnosis) {
-  const FitProblem problem = recorded(Truth(), 1, 3000);
+  const FitProblem problem = recorded(Truth(), 1, 6000);
   DiagnoseProblem diagnosis;
   diagnosis.rig = problem.rig;
-  diagnosis.runs = problem.runs;
+  diagnosis.runs = {test::part(problem.runs.front(), 0, 3000)};
+  diagnosis.heldout = {test::part(problem.runs.front(), 3000, 6000)};
   const Diagnosis d = diagnose(diagnosis);
   ASSERT_EQ(d.missing.size(), 1u);
   EXPECT_EQ(d.missing.front().effect, "bouc-wen");
+  ASSERT_EQ(d.runs.size(), 2u);
+  EXPECT_TRUE(d.runs[1].heldout);
+  EXPECT_GT(d.runs[1].rms_before, 10 * noise);
+  EXPECT_LT(d.runs[1].rms_after, 1.5 * noise) << "begun with an unknown memory";
 }
 
 }  // namespace
