@@ -172,8 +172,7 @@ class GrowingTrust {
     const VectorXd size = sizes(now);
     for (Index i = 0; i < now.size(); ++i) {
       const auto [lower, upper] = bounds(i, now[i]);
-      if (lower < 0 && size[i] > 0) then[i] = std::clamp(then[i], now[i] - size[i], now[i] + size[i]);
-      else if (now[i] > 0) then[i] = std::clamp(then[i], now[i] / 2, 2 * now[i]);
+      if (size[i] > 0) then[i] = std::clamp(then[i], lower < 0 ? now[i] - size[i] : now[i] / 2, now[i] + size[i]);
       then[i] = std::clamp(then[i], lower, upper);
       if (!std::isfinite(then[i])) then[i] = now[i];
     }

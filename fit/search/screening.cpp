@@ -52,6 +52,10 @@ void set_values(JointProblem& joint, const std::string& id, const VectorXd& valu
   for (Unknown* u : unknowns_of(joint, id)) u->value = values[joint.parameter(*u).place];
 }
 
+bool with_motions(const JointProblem& joint) {
+  return std::any_of(joint.runs().begin(), joint.runs().end(), [](const RunResidual& run) { return run.motion().unknowns() > 0; });
+}
+
 JointProblem back_at_the_rig(const JointProblem& joint) {
   JointProblem there = joint;
   back_to_the_rig(there, 2);
@@ -127,8 +131,7 @@ JointProblem Screening::best_start(const JointProblem& joint, const std::string&
     set_values(best, id, starts.front());
     return best;
   }
-  const bool with_motions = std::any_of(joint.runs().begin(), joint.runs().end(), [](const RunResidual& run) { return run.motion().unknowns() > 0; });
-  if ((with_motions || is_law_id(id)) && is_law(joint, id) && judge().first_order.known()) {
+  if ((with_motions(joint) || is_law_id(id)) && is_law(joint, id) && judge().first_order.known()) {
     double least = INFINITY;
     VectorXd chosen = starts.front();
     for (const VectorXd& start : starts) {
@@ -145,7 +148,7 @@ JointProblem Screening::best_start(const JointProblem& joint, const std::string&
   }
   const std::vector<RunResidual>& known = without_.joint.runs();
   const bool has_laws = std::any_of(known.begin(), known.end(), [](const RunResidual& run) { return laws_in(run) > 0; });
-  return best_of(at, without_.joint.chi2(), with_motions || has_laws);
+  return best_of(at, without_.joint.chi2(), with_motions(joint) || has_laws);
 }
 
 Arrival transferred(const FitProblem& problem, const Arrival& without, const std::shared_ptr<const AeroelasticModel>& model) {
@@ -182,6 +185,7 @@ Screening::Extended Screening::extend(const std::shared_ptr<const AeroelasticMod
   set_starts(joint, problem_.start);
   const bool to_first_order = added.size() == 1 && base_.first_order.known() && is_law(joint, added.front());
   extended.left = to_first_order ? base_.first_order.promise(joint, added.front()).left : left_by_a_step(joint);
+  if (extended.left > left_ && !with_motions(joint)) extended.left = std::min(extended.left, joint.chi2());  // from where iterations have led to first order all is lost
   extended.share = 1 - extended.left / left_;
   glance(joint, false);
   return extended;
