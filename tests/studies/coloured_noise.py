@@ -65,6 +65,16 @@ def second_order(n, r):
     return mixed(0.5, white(n, r), [v / size for v in out])
 
 
+def decimated(n, r):
+    """White noise at four times the rate behind a windowed sinc of 41 taps, every fourth sample: flat, and half of that at half the sampling rate."""
+    times, taps = 4, 41
+    at = [math.pi * (j - (taps - 1) / 2) / times for j in range(taps)]
+    answer = [(0.54 - 0.46 * math.cos(2 * math.pi * j / (taps - 1))) * (math.sin(x) / x if x else 1) for j, x in enumerate(at)]
+    size = math.sqrt(sum(a * a for a in answer))
+    e = [r.gauss(0, 1) for _ in range(times * n + taps)]
+    return [sum(a * e[times * k + j] for j, a in enumerate(answer)) / size for k in range(n)]
+
+
 COLOURS = {
     "white": white,
     "half first order, 8 Hz": lambda n, r: mixed(0.5, white(n, r), first_order(n, r, 8)),
@@ -74,6 +84,7 @@ COLOURS = {
     "all 1/f": one_over_f,
     "half second order, 20 Hz": second_order,
     "Student's t, 3": student,
+    "behind a filter against aliasing": decimated,
 }
 
 

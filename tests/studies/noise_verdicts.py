@@ -1,4 +1,4 @@
-"""Noise is no effect: what does `diagnose` name in noise of eight colours, with nothing hidden and with one effect hidden?
+"""Noise is no effect: what does `diagnose` name in noise of nine colours, with nothing hidden and with one effect hidden?
 
     python3 tests/studies/noise_verdicts.py build/unrig CAMPAIGNS SEEDS [TABLE]
 
