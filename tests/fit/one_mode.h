@@ -30,6 +30,19 @@ inline VectorXd white_noise(Index samples, unsigned seed) {
   return VectorXd::NullaryExpr(samples, [&] { return normal(random); });
 }
 
+/// White noise taken at so many times the rate and decimated behind a filter of a windowed sinc, as converters do: its spectrum is flat, and half of that at half the sampling rate.
+inline VectorXd decimated_noise(Index samples, unsigned seed) {
+  constexpr Index times = 4, taps = 41;
+  VectorXd filter(taps);
+  for (Index j = 0; j < taps; ++j) {
+    const double at = std::numbers::pi * (static_cast<double>(j) - 0.5 * (taps - 1)) / times, window = 0.54 - 0.46 * std::cos(2 * std::numbers::pi * static_cast<double>(j) / (taps - 1));
+    filter[j] = window * (at == 0 ? 1 : std::sin(at) / at);
+  }
+  filter /= filter.norm();
+  const VectorXd white = white_noise(times * samples + taps, seed);
+  return VectorXd::NullaryExpr(samples, [&](Index k) { return white.segment(times * k, taps).dot(filter); });
+}
+
 inline VectorXd tone(Index samples, double frequency) {
   return VectorXd::NullaryExpr(samples, [&](Index k) { return std::sin(2 * std::numbers::pi * frequency * dt * static_cast<double>(k)); });
 }

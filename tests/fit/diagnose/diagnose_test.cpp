@@ -12,6 +12,7 @@
 #include "core/files/text_file.h"
 #include "fit/diagnose/diagnose.h"
 #include "fit/diagnose/diagnosis_files.h"
+#include "tests/fit/one_mode.h"
 
 namespace unrig {
 namespace {
@@ -140,6 +141,20 @@ TEST(Diagnose, ASignalThatLeavesAMismatchIsNotNamed) {
   EXPECT_EQ(d.closest.front().effect, "tank-wave");
   EXPECT_GT(d.removed_by_closest, enough_to_name);
   EXPECT_EQ(d.naming, Naming::only_signals);
+}
+
+/// Noise that a filter has kept from the end of the spectrum: differences of the readings tell less of it than there is.
+TEST(Diagnose, NothingIsMissingInNoiseBehindAFilterAgainstAliasing) {
+  constexpr Eigen::Index samples = 4000;
+  for (const unsigned seed : {1u, 2u, 3u}) {
+    DiagnoseProblem problem;
+    problem.rig = one_mode::rig();
+    for (const unsigned run : {0u, 1u}) problem.runs.push_back(one_mode::decay("decay_" + std::to_string(run) + ".csv", 5 * one_mode::free_response(samples, one_mode::hertz).col(run) + 0.03 * one_mode::decimated_noise(samples, 2 * seed + run)));
+    const Diagnosis d = diagnose(problem);
+    EXPECT_TRUE(d.missing.empty()) << seed;
+    EXPECT_FALSE(d.unexplained) << seed << ": " << d.remaining.summary;
+    for (const ImprovedRun& run : d.runs) EXPECT_NEAR(run.noise, 0.03, 0.002) << seed << ": of 4000 samples 1 %";
+  }
 }
 
 TEST(DiagnosisFile, HasWhatTheFormatPromises) {

@@ -13,6 +13,7 @@
 
 #include "core/numerics/spectrum.h"
 #include "core/propagate/response.h"
+#include "tests/fit/one_mode.h"
 
 namespace unrig {
 namespace {
@@ -163,25 +164,10 @@ TEST(NoiseColour, IsFoundWithItsSize) {
   }
 }
 
-/// White noise taken at so many times the rate and decimated behind a filter of a windowed sinc, as converters do: its spectrum is flat, and half of that at half the sampling rate.
-VectorXd decimated(Index samples, unsigned seed) {
-  constexpr Index times = 4, taps = 41;
-  VectorXd filter(taps);
-  for (Index j = 0; j < taps; ++j) {
-    const double at = std::numbers::pi * (static_cast<double>(j) - 0.5 * (taps - 1)) / times, window = 0.54 - 0.46 * std::cos(2 * std::numbers::pi * static_cast<double>(j) / (taps - 1));
-    filter[j] = window * (at == 0 ? 1 : std::sin(at) / at);
-  }
-  filter /= filter.norm();
-  std::mt19937_64 random(seed);
-  std::normal_distribution<double> normal;
-  const VectorXd white = VectorXd::NullaryExpr(times * samples + taps, [&] { return normal(random); });
-  return VectorXd::NullaryExpr(samples, [&](Index k) { return white.segment(times * k, taps).dot(filter); });
-}
-
 TEST(NoiseColour, BehindAFilterAgainstAliasingIsFound) {
   constexpr Index samples = 8192, lines = 401;
   for (const unsigned seed : {1u, 2u, 3u, 4u}) {
-    const VectorXd noise = decimated(samples, seed);
+    const VectorXd noise = one_mode::decimated_noise(samples, seed);
     const std::optional<NoiseColour> found = colour_of({{noise, dt}});
     ASSERT_TRUE(found) << seed;
     ASSERT_GT(found->falling.size(), 0) << seed;
