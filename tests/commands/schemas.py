@@ -65,6 +65,18 @@ def held_pluck(path, decay, held=200, step=0.002):
     return write(path, "\n".join([*lines[:first], *hold, *behind]) + "\n")
 
 
+def behind_a_filter(path, samples=8000, step=0.004):
+    """A decay at 7 Hz with noise that has gone through a filter against aliasing: white at four times the rate, a windowed sinc."""
+    at = [math.pi * (j - 20) / 4 for j in range(41)]
+    answer = [(0.54 - 0.46 * math.cos(math.pi * j / 20)) * (math.sin(x) / x if x else 1) for j, x in enumerate(at)]
+    noise, lines = random.Random(2), ['# unrig_run = 1', '# kind = "pluck"', '# medium = "air"', '# density = "1.2 kg/m^3"', '# speed = "0 m/s"', "time [s],gauge [N]"]
+    white = [noise.gauss(0, 0.002) for _ in range(4 * samples + 41)]
+    for k in range(samples):
+        decay = math.exp(-0.4 * step * k) * math.cos(2 * math.pi * 7 * step * k)
+        lines.append(f"{step * k:.3f},{decay + sum(a * white[4 * k + j] for j, a in enumerate(answer)):.6f}")
+    return write(path, "\n".join(lines) + "\n")
+
+
 def make_results(out):
     """All kinds of results, into the folder `out`."""
     decays, steps = ("dry_pluck.csv", "wet_pluck.csv"), ("step_a.csv", "step_b.csv")
@@ -97,6 +109,8 @@ def make_results(out):
 
     mode = write(out / "mode.toml", 'unrig_rig = 1\nname = "one mode"\n[[modal]]\nmass = "1 kg"\nfrequency = "7 Hz"\ndamping_ratio = 0.01\ngauge_gain = "1 N/m"\n')
     unrig("diagnose", "--rig", mode, *(damped_decay(out / f"{name}.csv", start) for name, start in (("large", 1.0), ("small", -0.4))), "-o", out / "diagnosis_law.json", status=(0, 1))
+
+    unrig("fit", "--rig", mode, behind_a_filter(out / "behind_a_filter.csv"), "-o", out / "fit_behind_a_filter.json", status=(0, 1))
 
     for shard in (1, 2):
         unrig("trial", *campaign("null"), "--trials", 3, "--effects", "tank-wave,gauge-lowpass", "--shard", f"{shard}/2", "-o", out / f"trial_{shard}.json")
