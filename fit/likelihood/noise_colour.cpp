@@ -203,7 +203,7 @@ double NoiseColour::density(double frequency, double dt) const {
 
 namespace {
 
-/// All parts, none smaller than a spectrum of a hundredth of the white one's: what a few lines said no of may be asked again. Of falling ones those that are larger.
+/// All parts, none smaller than a spectrum of a hundredth of the white one's: what a few lines said no of may be asked again. Of falling ones those of more than a hundredth of the white variance.
 NoiseColour colour_from(const VectorXd& corner, const VectorXd& powers, double dt) {
   constexpr double least = 1e-6, hardly = 0.01;
   NoiseColour colour;

@@ -29,7 +29,7 @@ NoiseColour three_parts() { return {VectorXd{{0.3, 4, 40}}, VectorXd{{2, 0.5, 0.
 /// The same behind a filter against aliasing, of which little is white.
 NoiseColour behind_a_filter() { return {VectorXd{{0.3, 4}}, VectorXd{{2, 0.5}}, 0.1, VectorXd{{0.4, 0.3, 0.6}}}; }
 
-/// Sum over the steps of white noise behind which a falling part follows it: 1, 1 + b, b (1 + b), ...
+/// What one sample of white noise leaves in a falling part, sample by sample: 1, 1 + b, b (1 + b), ...
 std::vector<double> answer_of_falling(std::size_t which, std::size_t steps) {
   const double tangent = std::tan(std::numbers::pi * std::array{0.25, 0.375, 0.45}.at(which)), b = (1 - tangent) / (1 + tangent);
   std::vector<double> answer{1};
@@ -78,9 +78,9 @@ MatrixXd covariance_of(const NoiseColour& colour, Index samples) {
   return covariance;
 }
 
-/// Behind the filter, with the noise's own start where its prior and the readings put it: chi-square and determinant are those of the whole covariance.
 class WhiteningFilterOf : public testing::TestWithParam<NoiseColour> {};
 
+/// Behind the filter, with the noise's own start where its prior and the readings put it: chi-square and determinant are those of the whole covariance.
 TEST_P(WhiteningFilterOf, SaysWhatTheWholeCovarianceSays) {
   const NoiseColour colour = GetParam();
   const WhiteningFilter filter(colour, dt);
