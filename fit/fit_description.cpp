@@ -12,7 +12,7 @@
 #include "core/effects/effect.h"
 #include "core/files/error.h"
 #include "core/rig/fingerprint.h"
-#include "core/rig/gauge_lever.h"
+#include "core/rig/bridge.h"
 #include "fit/uncertainty/coloured_noise.h"
 #include "fit/likelihood/explained.h"
 #include "fit/likelihood/modal_frequencies.h"
@@ -84,7 +84,7 @@ double reading_of_steady_load(const RunResidual& residual) {
   const Rig& rig = residual.model().rig();
   const Conditions& c = residual.conditions();
   if (rig.gauge_element == 0 || c.speed == 0 || residual.channels().front() != "gauge") return 0;
-  return gauge_reading_of_unit_coefficient(rig, c.density, c.speed);
+  return reading_of_unit_coefficient(rig, gauge_levers(rig), c.density, c.speed);
 }
 
 void check_lengths(const JointProblem& joint) {

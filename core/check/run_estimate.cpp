@@ -10,7 +10,6 @@
 #include "core/model/wagner.h"
 #include "core/numerics/spectrum.h"
 #include "core/propagate/response.h"
-#include "core/rig/gauge_lever.h"
 #include "core/rig/structure.h"
 #include "core/run/motion.h"
 

@@ -12,7 +12,7 @@
 
 #include "core/propagate/exact_step.h"
 #include "core/law/learnt_range.h"
-#include "core/rig/gauge_lever.h"
+#include "core/rig/bridge.h"
 #include "core/model/ideal_step.h"
 #include "core/run/motion.h"
 #include "core/propagate/nonlinear_response.h"
@@ -183,8 +183,14 @@ VectorXd steady_reading(const SimulateProblem& problem, const LinearSystem& syst
   VectorXd reading = angle * system.C.value.col(system.motion);
   reading += system.C.value * static_state(system, angle * system.A.value.col(system.motion));
   const Rig& rig = problem.model.rig();
-  if (problem.steady_normal_force && rig.gauge_element > 0)
-    reading[0] = *problem.steady_normal_force * gauge_reading_of_unit_coefficient(rig, problem.run.density, problem.run.speed);
+  if (!problem.steady_normal_force) return reading;
+  const auto steady = [&](const BridgeLevers& levers) { return *problem.steady_normal_force * reading_of_unit_coefficient(rig, levers, problem.run.density, problem.run.speed); };
+  Index output = 0;
+  if (rig.has_gauge()) reading[output++] = steady(gauge_levers(rig));
+  for (const Sensor& sensor : rig.sensors) {
+    if (sensor.reads == SensorKind::load) reading[output] = steady(bridge_levers(rig, sensor.element, sensor.row));
+    ++output;
+  }
   return reading;
 }
 

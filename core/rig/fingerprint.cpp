@@ -83,7 +83,10 @@ Part gauge_of(const Rig& rig) {
 
 Part sensors_of(const Rig& rig) {
   Part part;
-  for (const Sensor& s : rig.sensors) part.add(s.column).add(static_cast<double>(s.reads)).add(s.element).add(s.gain).add(s.unit);
+  for (const Sensor& s : rig.sensors) {
+    part.add(s.column).add(static_cast<double>(s.reads)).add(s.element).add(s.gain).add(s.unit);
+    if (s.reads == SensorKind::load) part.add(s.row.per_force).add(s.row.per_bending_moment).add(s.row.per_torque);
+  }
   for (const ModalMode& mode : rig.modal)
     if (!mode.sensor_shape.empty()) part.all(mode.sensor_shape);
   return part;

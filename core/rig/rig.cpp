@@ -7,6 +7,7 @@
 #include <array>
 #include <cmath>
 #include <filesystem>
+#include <tuple>
 #include <utility>
 
 #include "core/rig/parse_rig.h"
@@ -26,7 +27,7 @@ using Eigen::VectorXd;
 
 constexpr std::array sensor_kinds = {std::pair{"displacement", SensorKind::displacement}, std::pair{"velocity", SensorKind::velocity},
                                      std::pair{"acceleration", SensorKind::acceleration}, std::pair{"twist", SensorKind::twist},
-                                     std::pair{"twist_rate", SensorKind::twist_rate}};
+                                     std::pair{"twist_rate", SensorKind::twist_rate}, std::pair{"load", SensorKind::load}};
 
 void check_rig_version(const TomlTable& file, const std::string& path) {
   if (!file.has("unrig_rig")) {
@@ -150,7 +151,7 @@ SensorKind sensor_kind(const TomlTable& sensor) {
     if (text == name) return kind;
   }
   sensor.fail("reads", fmt::format("{} is \"{}\"", sensor.full_name("reads"), text),
-              "wanted \"displacement\", \"velocity\", \"acceleration\", \"twist\" or \"twist_rate\"");
+              "wanted \"displacement\", \"velocity\", \"acceleration\", \"twist\", \"twist_rate\" or \"load\"");
 }
 
 const char* quantity_unit(SensorKind kind) {
@@ -160,23 +161,49 @@ const char* quantity_unit(SensorKind kind) {
     case SensorKind::acceleration: return "m/s^2";
     case SensorKind::twist: return "rad";
     case SensorKind::twist_rate: return "rad/s";
+    case SensorKind::load: break;  // each of its keys has its own
   }
   return "";
 }
 
-/// A plain number, or number and unit: "0.5 V/m" is the gain of a column in volts.
+struct Gain {
+  double value;
+  std::string unit;  // SI, of the column
+};
+
+/// Per `quantity`: a plain number, or number and unit: "0.5 V/m" is the gain of a column in volts.
+Gain sensor_gain(const TomlTable& table, const std::string& key, const char* quantity) {
+  if (!table.has_text(key)) return {table.number_or(key, 1), quantity};
+  const InputError::Place place = table.place(key);
+  const std::string name = table.full_name(key);
+  const Measure measure = split_quantity(table.text(key), place, name);
+  return {unit_scale(measure.unit, si_unit(measure.unit, place, name), place, name)(measure.value), si_unit(fmt::format("({}).({})", measure.unit, quantity), place, name)};
+}
+
 void take_sensor_gain(const TomlTable& table, Sensor& sensor) {
-  sensor.unit = quantity_unit(sensor.reads);
-  if (table.has_text("gain")) {
-    const InputError::Place place = table.place("gain");
-    const std::string name = table.full_name("gain");
-    const Measure measure = split_quantity(table.text("gain"), place, name);
-    sensor.gain = unit_scale(measure.unit, si_unit(measure.unit, place, name), place, name)(measure.value);
-    sensor.unit = si_unit(fmt::format("({}).({})", measure.unit, sensor.unit), place, name);
-  } else {
-    sensor.gain = table.number_or("gain", 1);
-  }
+  const Gain gain = sensor_gain(table, "gain", quantity_unit(sensor.reads));
+  sensor.gain = gain.value, sensor.unit = gain.unit;
   if (sensor.gain == 0) table.fail("gain", fmt::format("{} is 0", table.full_name("gain")), "wanted a gain that is not zero");
+}
+
+/// The row of the calibration matrix of a further bridge.
+void take_calibration_row(const TomlTable& table, const Rig& rig, Sensor& sensor) {
+  const std::array entries{std::tuple{"per_force", "N", &sensor.row.per_force}, std::tuple{"per_bending_moment", "N.m", &sensor.row.per_bending_moment}, std::tuple{"per_torque", "N.m", &sensor.row.per_torque}};
+  for (const auto& [key, quantity, entry] : entries) {
+    if (!table.has(key)) continue;
+    const Gain gain = sensor_gain(table, key, quantity);
+    *entry = gain.value;
+    if (!sensor.unit.empty() && sensor.unit != gain.unit)
+      table.fail(key, fmt::format("{} makes the reading one in {}, another key one in {}", table.full_name(key), gain.unit, sensor.unit), "wanted one unit of the reading, as \"0.1 V/N\" beside \"2 V/(N.m)\"");
+    sensor.unit = gain.unit;
+  }
+  const CalibrationRow& row = sensor.row;
+  if (row.per_force == 0 && row.per_bending_moment == 0 && row.per_torque == 0)
+    table.fail("reads", fmt::format("the bridge \"{}\" reads no load", sensor.column), "wanted per_force, per_bending_moment or per_torque, not zero");
+  if (sensor.element == rig.station.size()) table.fail("element", fmt::format("the bridge \"{}\" sits at the last element", sensor.column), "wanted elements outboard of it, which load it");
+  if (row.per_torque != 0 && sensor.element >= rig.rigid_from)
+    table.fail("element", fmt::format("the bridge \"{}\" sits at element {}, in the part that is rigid in torsion", sensor.column, sensor.element), fmt::format("wanted an element below torsion.rigid_from = {} where per_torque is given", rig.rigid_from),
+               "The moment of inertia of a rigid part is known as a whole.");
 }
 
 /// Sensors of a rig of elements say at which; a rig known only as modes says it mode by mode (`sensor_shape`).
@@ -184,13 +211,17 @@ void take_sensors(const TomlTable& file, Rig& rig, bool of_elements) {
   for (const TomlTable& table : file.tables("sensor")) {
     if (!of_elements && table.has("element"))
       table.fail("element", fmt::format("{} stands beside [[modal]], which has no elements", table.full_name("element")), "wanted where the sensor sits as sensor_shape of each [[modal]]");
-    table.allow_only({"column", "reads", "element", "gain"});
     Sensor sensor;
     sensor.column = table.text("column");
     sensor.reads = sensor_kind(table);
+    const bool is_bridge = sensor.reads == SensorKind::load;
+    if (is_bridge) table.allow_only({"column", "reads", "element", "per_force", "per_bending_moment", "per_torque"});
+    else table.allow_only({"column", "reads", "element", "gain"});
+    if (is_bridge && !of_elements) table.fail("reads", fmt::format("{} is \"load\" beside [[modal]]", table.full_name("reads")), "wanted \"displacement\": what a bridge reads per unit of each mode is its sensor_shape");
     const bool turns = sensor.reads == SensorKind::twist || sensor.reads == SensorKind::twist_rate;
     if (of_elements) sensor.element = element_number(table, "element", turns ? rig.torsion.inertia.size() : rig.station.size());
-    take_sensor_gain(table, sensor);
+    if (is_bridge) take_calibration_row(table, rig, sensor);
+    else take_sensor_gain(table, sensor);
     const auto same = [&sensor](const Sensor& other) { return other.column == sensor.column; };
     if (std::any_of(rig.sensors.begin(), rig.sensors.end(), same)) {
       table.fail("column", fmt::format("two sensors name the column \"{}\"", sensor.column), "wanted one sensor per column");

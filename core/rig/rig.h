@@ -22,13 +22,22 @@ struct Chain {
 };
 
 /// What a further channel measures (correct/manual/rig_files.md).
-enum class SensorKind { displacement, velocity, acceleration, twist, twist_rate };
+enum class SensorKind { displacement, velocity, acceleration, twist, twist_rate, load };
+
+/// A row of a balance's calibration matrix: what a bridge reads per unit of the loads outboard of it (core/rig/bridge.h), in SI.
+struct CalibrationRow {
+  double per_force = 0;           ///< normal force [N]
+  double per_bending_moment = 0;  ///< at the bridge [N m], positive where a positive normal force bends it
+  double per_torque = 0;          ///< about the pitch axis, nose up [N m]
+};
+
 struct Sensor {
   std::string column;
   SensorKind reads = SensorKind::displacement;
   int element = 1;  ///< from 1, in the normal chain, or in the torsion chain for twist and twist_rate
-  double gain = 1;  ///< column (SI) per unit of the model's quantity (SI)
+  double gain = 1;  ///< column (SI) per unit of the model's quantity (SI); of a load 1
   std::string unit;  ///< SI unit of the column: the quantity's, times the gain's where the gain has one ("0.5 V/m")
+  CalibrationRow row = {};  ///< of a load
 };
 
 /// One mode of a rig that is known only as modes.

@@ -67,11 +67,8 @@ Basis make_basis(const Rig& rig, Index normal_modes, Index torsion_modes) {
   basis.normal.leftCols(normal_modes) = normal.shape.leftCols(normal_modes);
   basis.twist.setZero(elements, basis.size());
   for (Index i = 0; i < elements; ++i) basis.twist.row(i).tail(torsion_modes) = torsion.shape.row(carrier(rig, i)).head(torsion_modes);
-  const MatrixXd shape = torsion.shape.leftCols(torsion_modes);
-  basis.torsion_inertia.setZero(basis.size(), basis.size());
-  basis.torsion_inertia.bottomRightCorner(torsion_modes, torsion_modes) = shape.transpose() * rig.torsion.inertia.asDiagonal() * shape;
-  basis.torsion_pitch_inertia.setZero(basis.size());
-  basis.torsion_pitch_inertia.tail(torsion_modes) = shape.transpose() * rig.torsion.inertia;
+  basis.torsion_chain.setZero(rig.torsion.inertia.size(), basis.size());
+  basis.torsion_chain.rightCols(torsion_modes) = torsion.shape.leftCols(torsion_modes);
   return basis;
 }
 

@@ -27,8 +27,7 @@ struct Basis {
   Eigen::VectorXd omega;   ///< rad/s in vacuum at the rig file's stiffness, normal then torsional
   Eigen::MatrixXd normal;  ///< elements x coordinates
   Eigen::MatrixXd twist;   ///< elements x coordinates, extended over the rigid part (seed, Eq. 3.4c)
-  Eigen::MatrixXd torsion_inertia;    ///< T^T J T over all coordinates
-  Eigen::VectorXd torsion_pitch_inertia;  ///< T^T J 1: how rotation of the shaft drives each coordinate
+  Eigen::MatrixXd torsion_chain;  ///< elements of the torsional chain x coordinates: their twist
 
   Eigen::Index size() const { return normal_modes + torsion_modes; }
 };

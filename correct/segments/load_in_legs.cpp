@@ -1,13 +1,13 @@
 #include "correct/segments/load_in_legs.h"
 
-#include "core/rig/gauge_lever.h"
+#include "core/rig/bridge.h"
 
 namespace unrig {
 
 using Eigen::Index;
 using Eigen::VectorXd;
 
-double steady_per_reading(const Rig& rig) { return 1 / gauge_reading_of_unit_load(rig); }
+double steady_per_reading(const Rig& rig) { return 1 / reading_of_unit_load(rig, gauge_levers(rig)); }
 
 RigidLoad load_at(const RunResidual& residual, const VectorXd& theta, const VectorXd& c, const std::vector<Index>& at, const RigidLoad::State& from) {
   RigidLoad load = rigid_load(residual.model(), residual.conditions(), theta, residual.motion(), residual.run().dt, c.head(residual.motion().unknowns()), at, from);

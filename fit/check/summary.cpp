@@ -9,7 +9,7 @@
 #include "core/check/run_estimate.h"
 #include "core/model/aeroelastic_model.h"
 #include "core/model/wagner.h"
-#include "core/rig/gauge_lever.h"
+#include "core/rig/bridge.h"
 #include "core/rig/structure.h"
 #include "core/run/motion.h"
 
@@ -41,7 +41,7 @@ RigInMedium in_medium(const AeroelasticModel& model, const std::string& name, do
   const double span = rig.strip_length * static_cast<double>(rig.submerged.size()), b = rig.semichord();
   medium.apparent_mass = pi * density * b * b * span;
   medium.load_per_degree = density * speed * speed * b * span * 2 * pi * (pi / 180);
-  if (rig.gauge_element > 0) medium.gauge_per_degree = gauge_reading_of_unit_coefficient(rig, density, speed) * 2 * pi * (pi / 180);
+  if (rig.gauge_element > 0) medium.gauge_per_degree = reading_of_unit_coefficient(rig, gauge_levers(rig), density, speed) * 2 * pi * (pi / 180);
   return medium;
 }
 
@@ -77,7 +77,7 @@ ChannelSummary channel_summary(const Channel& channel, const StepMotion& motion)
     for (Index k = 0; k < value.size(); ++k)
       if (spikes[static_cast<std::size_t>(k)]) value[k] = std::numeric_limits<double>::quiet_NaN();
   }
-  const VectorXd rest = motion.found ? numbers_of(value.head(motion.begin)) : VectorXd();
+  const VectorXd rest = motion.found ? numbers_of(value.head(motion.begin - motion.begin / 10)) : VectorXd();  // a motion begins before it leaves the angle's noise
   if (rest.size() >= least) summary.white_share = white_share(rest, summary.noise);
   return summary;
 }
@@ -106,7 +106,7 @@ RigSummary summary_of(const Rig& rig, const std::vector<Run>& runs) {
   const Index loaded = rig.loaded_element() - 1;
   summary.loaded_element = rig.loaded_element();
   summary.deflection = rig.normal.flexibility(loaded, loaded);
-  if (rig.gauge_element > 0) summary.gauge_per_newton = gauge_reading_of_unit_load(rig);
+  if (rig.gauge_element > 0) summary.gauge_per_newton = reading_of_unit_load(rig, gauge_levers(rig));
   constexpr double air = 1.2;
   summary.media.push_back(in_medium(model, "vacuum", 0, 0));
   summary.media.push_back(in_medium(model, "air", air, 0));

@@ -8,7 +8,7 @@
 
 #include "core/effects/effect.h"
 #include "core/numerics/in_parallel.h"
-#include "core/rig/gauge_lever.h"
+#include "core/rig/bridge.h"
 #include "fit/fit_description.h"
 
 namespace unrig {
@@ -109,7 +109,7 @@ class SystemSlopes {
     slope.B += weight * system.B.value;
     slope.C += weight * system.C.value;
     slope.D += weight * system.D.value;
-    if (reading_of_steady_load(run_) != 0) slope.unit += weight * std::log(gauge_reading_of_unit_coefficient(model.rig(), head.density, head.speed));
+    if (reading_of_steady_load(run_) != 0) slope.unit += weight * std::log(reading_of_unit_coefficient(model.rig(), gauge_levers(model.rig()), head.density, head.speed));
   }
 
   const Arrival& at_;

@@ -7,7 +7,7 @@
 #include <utility>
 #include <vector>
 
-#include "core/rig/gauge_lever.h"
+#include "core/rig/bridge.h"
 #include "core/model/simulate.h"
 #include "fit/fit.h"
 #include "fit/likelihood/joint_problem.h"
@@ -48,7 +48,7 @@ TEST(Offset, ErrorsCoverTheTruth) {
   const Rig rig = read_rig(test::null_campaign("rig.toml"));
   const AeroelasticModel model(rig, make_basis(rig, Index{2}, Index{1}), wagner(Wagner::within_1e4));
   const unrig::Run clean = simulated_step(model);
-  const double truth = steady_coefficient * gauge_reading_of_unit_coefficient(rig, clean.density, clean.speed);
+  const double truth = steady_coefficient * reading_of_unit_coefficient(rig, gauge_levers(rig), clean.density, clean.speed);
   double squares = 0;
   constexpr int seeds = 40;
   for (int seed = 1; seed <= seeds; ++seed) {

@@ -1,4 +1,4 @@
-#include "core/rig/gauge_lever.h"
+#include "core/rig/bridge.h"
 #include "core/model/simulate.h"
 
 #include <gmock/gmock.h>
@@ -96,7 +96,8 @@ TEST_F(Simulate, MeetsASimulatorThatSharesNoCodeWithIt) {
 TEST_F(Simulate, StepStartsAndEndsSteady) {
   const SimulateResult result = simulate(problem(model_of("seed/rig_from_drawings.toml", 4), step()));
   const auto per_degree = [&](const std::string& column, Index k) { return result.run.channel(column).value[k]; };
-  const double reading = gauge_reading_of_unit_coefficient(read_rig(sample("seed/rig_from_drawings.toml")), 998.2, 0.6) * 2 * pi * pi / 180;
+  const Rig rig = read_rig(sample("seed/rig_from_drawings.toml"));
+  const double reading = reading_of_unit_coefficient(rig, gauge_levers(rig), 998.2, 0.6) * 2 * pi * pi / 180;
   EXPECT_NEAR(per_degree("gauge", 0), reading, 1e-9 * reading) << "2 pi per radian, at 1 deg";
   EXPECT_NEAR(per_degree("normal_force", 0), reading, 1e-9 * reading) << "three strips about the calibration element";
   EXPECT_NEAR(per_degree("tip_twist", 0), pi / 180, 1e-12) << "the load acts on the pitch axis";
@@ -112,7 +113,7 @@ TEST_F(Simulate, SteadyNormalForceReplacesTheLinearOne) {
   const unrig::Run linear = simulate(p).run;
   p.steady_normal_force = 0.5;
   const unrig::Run given = simulate(p).run;
-  const double unit = gauge_reading_of_unit_coefficient(p.model.rig(), 998.2, 0.6);
+  const double unit = reading_of_unit_coefficient(p.model.rig(), gauge_levers(p.model.rig()), 998.2, 0.6);
   EXPECT_NEAR(given.channel("gauge").value[0], 0.5 * unit, 1e-12 * unit);
   const VectorXd shift = given.channel("gauge").value - linear.channel("gauge").value;
   EXPECT_LT((shift.array() - shift[0]).abs().maxCoeff(), 1e-12 * unit) << "a constant of the run";

@@ -190,6 +190,41 @@ TEST(Rig, SensorsMayStandInForTheGauge) {
   EXPECT_DOUBLE_EQ(rig.sensors[1].gain, 0.005 * 180 / std::numbers::pi);
 }
 
+const std::string balance = R"toml(
+[[sensor]]
+column = "bridge_2"
+reads = "load"
+element = 1
+per_force = "0.5 mV/N"
+per_bending_moment = "2 V/(kN.m)"
+per_torque = "3 mV/(N.m)"
+)toml";
+
+TEST(Rig, ASensorOfLoadIsARowOfACalibrationMatrix) {
+  const Rig rig = read(beam + balance);
+  ASSERT_EQ(rig.sensors.size(), 1u);
+  const Sensor& s = rig.sensors.front();
+  EXPECT_EQ(s.reads, SensorKind::load);
+  EXPECT_EQ(s.element, 1);
+  EXPECT_EQ(s.unit, "V");
+  EXPECT_DOUBLE_EQ(s.row.per_force, 5e-4);
+  EXPECT_DOUBLE_EQ(s.row.per_bending_moment, 2e-3);
+  EXPECT_DOUBLE_EQ(s.row.per_torque, 3e-3);
+  const Rig plain = read(beam + "[[sensor]]\ncolumn=\"root\"\nreads=\"load\"\nelement=3\nper_bending_moment=1.0\n");
+  EXPECT_EQ(plain.sensors.front().unit, "N.m");
+  EXPECT_EQ(plain.sensors.front().row.per_force, 0);
+}
+
+TEST(Rig, WhatIsWrongInACalibrationMatrixIsSaid) {
+  const auto refused = [](const std::string& from, const std::string& to) { return refusal(beam + replaced(balance, from, to)); };
+  EXPECT_THAT(refused("per_torque = \"3 mV/(N.m)\"", "per_torque = \"3 rad/(N.m)\""), AllOf(HasSubstr("rig.toml:"), HasSubstr("per_torque"), HasSubstr("rad"), HasSubstr("one unit of the reading")));
+  EXPECT_THAT(refused("element = 1", "element = 2"), AllOf(HasSubstr("bridge_2"), HasSubstr("rigid"), HasSubstr("rigid_from = 2")));
+  EXPECT_THAT(refused("element = 1", "element = 4"), AllOf(HasSubstr("bridge_2"), HasSubstr("last element")));
+  EXPECT_THAT(refused("per_force = \"0.5 mV/N\"", "gain = 2.0"), HasSubstr("gain"));
+  EXPECT_THAT(refusal(beam + "[[sensor]]\ncolumn=\"b\"\nreads=\"load\"\nelement=1\n"), AllOf(HasSubstr("reads no load"), HasSubstr("per_bending_moment")));
+  EXPECT_THAT(refusal(modal + "sensor_shape = [1]\n[[sensor]]\ncolumn=\"b\"\nreads=\"load\"\nper_force=1.0\n"), AllOf(HasSubstr("[[modal]]"), HasSubstr("sensor_shape")));
+}
+
 // ------------------------------------------------------------------------------------------------------ flexibility
 
 TEST(RigFlexibility, PrintedDigitsMayMissPositiveDefinitenessWithAWarning) {
