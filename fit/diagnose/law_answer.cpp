@@ -21,6 +21,7 @@ bool is_undetermined(const FitProblem& problem, const Trial& set) {
   with.effects = set.effects;
   with.rig.laws = set.arrival.joint.model().rig().laws;
   Arrival arrival = set.arrival;
+  arrival.converged = true;  // wherever the search ended
   const FitResult fit = describe_fit(arrival, with, Settle::nothing);
   return std::any_of(set.effects.begin(), set.effects.end(), [&](const std::string& id) {
     const auto is_own = [&](const FittedParameter& p) { return p.effect == id; };

@@ -259,7 +259,7 @@ std::vector<Eigen::Index> coefficients_of(const Law& law) {
 }
 
 std::vector<VectorXd> shapes_of(const Form& form, Grid grid) {
-  const bool fine = grid == Grid::fine;
+  const bool fine = grid == Grid::fine, first = grid == Grid::first;
   const Law& law = form.law;
   std::vector<VectorXd> shapes{form.starts.front()};
   const std::vector<Eigen::Index> linear = coefficients_of(law);
@@ -267,7 +267,11 @@ std::vector<VectorXd> shapes_of(const Form& form, Grid grid) {
     if (std::find(linear.begin(), linear.end(), static_cast<Eigen::Index>(k)) != linear.end()) continue;
     const Parameter& p = law.parameters[k];
     std::vector<double> values;
-    if (p.name == "p") values = fine ? std::vector<double>{0.5, 1.5, 2, 2.5, 3, 4, 5} : std::vector<double>{0.5, 1.2, 2, 4};
+    const bool is_corner = p.lower == 0 && p.upper < 1e30;  // between nothing and all that the runs reach
+    if (is_corner)
+      for (const double share : fine ? std::vector<double>{0.02, 0.05, 0.1, 0.2, 0.35, 0.5, 0.65, 0.8, 0.9} : std::vector<double>{0.2, 0.5, 0.8}) values.push_back(share * p.upper);
+    else if (first) values = {shapes.front()[static_cast<Eigen::Index>(k)]};
+    else if (p.name == "p") values = fine ? std::vector<double>{0.5, 1.5, 2, 2.5, 3, 4, 5} : std::vector<double>{0.5, 1.2, 2, 4};
     else
       for (const double factor : fine ? std::vector<double>{0.2, 0.5, 1, 2, 4} : std::vector<double>{0.3, 1, 3}) values.push_back(factor * shapes.front()[static_cast<Eigen::Index>(k)]);
     std::vector<VectorXd> each;

@@ -43,8 +43,9 @@ Eigen::VectorXd as_listed(const Form& form, const Eigen::VectorXd& own);
 /// Parameters in which the force of a law of the dictionary is linear: those called c, c2 ... , f and k.
 std::vector<Eigen::Index> coefficients_of(const Law& law);
 
-/// Shapes that a form may have, at its first coefficients: exponents, corners and times over the range in which they matter; coarse where slopes in them tell the rest.
-enum class Grid { coarse, fine };
+/// Shapes that a form may have, at its first coefficients: exponents, corners and times over the range in which they matter; coarse where slopes in them tell the rest. `first`: corners alone, beyond which a run
+/// may hardly go, so that slopes at another say nothing of it.
+enum class Grid { first, coarse, fine };
 std::vector<Eigen::VectorXd> shapes_of(const Form& form, Grid grid);
 
 /// The form as an effect of a rig, with its starts.

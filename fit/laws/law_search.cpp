@@ -102,7 +102,7 @@ std::vector<std::string> LawSearch::forms_worth_a_fit(const Trial& base, const P
   std::vector<std::size_t> all(forms.size());
   std::iota(all.begin(), all.end(), std::size_t{0});
   std::vector<Form> at_first = forms;
-  for (Form& form : at_first) form.starts.resize(1);
+  for (Form& form : at_first) form.starts = shapes_of(form, Grid::first);
   const std::vector<double> at_first_shape = screen_forms(base, screening, at_first, all);
   // At its best shape a form promises up to some times of that.
   std::erase_if(all, [&](std::size_t i) { return !(at_first_shape[i] > other_shapes * std::max(known.by_a_law, known.by_a_signal)); });
@@ -258,7 +258,8 @@ void LawSearch::follow(std::vector<Trial> tried, const Trial& base, bool from_he
   const bool one_will_do = base.reduced_chi2() > nearly_explained && std::none_of(tried.begin(), tried.end(), [](const Trial& t) { return is_law_id(t.effects.back()); });
   const auto excess = [](const Trial& t) { return std::max(0.0, left_of_decays(t) - 1); };
   const auto follows_decays = [&](const Trial& t) { return !t.ruled_out && (!by_decays || excess(t) < explained - 1); };
-  const auto is_near = [&](const Trial& t) { return !by_decays || left_of_decays(t) < nearly_explained; };  // what leaves more of the decays is at most what another law acts beside
+  const auto told = [&](const Trial& t) { return by_decays && std::isfinite(t.decays.chi2); };  // near the noise decays are not fitted by themselves
+  const auto is_near = [&](const Trial& t) { return !told(t) || left_of_decays(t) < nearly_explained; };  // what leaves more of the decays is at most what another law acts beside
   const std::size_t others = all.size();
   double least = INFINITY;
   const auto follow_some = [&](std::size_t first, std::size_t& end) {
@@ -274,10 +275,10 @@ void LawSearch::follow(std::vector<Trial> tried, const Trial& base, bool from_he
     }
     // Of thousands of samples twice the excess of another is beyond any evidence.
     for (std::size_t i = first; i < end; ++i)
-      if (by_decays && !tried[i].ruled_out) least = std::min(least, std::max(excess(tried[i]), explained - 1));
+      if (told(tried[i]) && !tried[i].ruled_out) least = std::min(least, std::max(excess(tried[i]), explained - 1));
     const std::size_t before = all.size();
     for (std::size_t i = first; i < end; ++i)
-      if (!tried[i].ruled_out && !(by_decays && excess(tried[i]) > 2 * least)) all.push_back(std::move(tried[i]));
+      if (!tried[i].ruled_out && !(told(tried[i]) && excess(tried[i]) > 2 * least)) all.push_back(std::move(tried[i]));
     in_parallel(all.size() - before, [&](std::size_t i) {
       if (!driven && is_near(all[before + i])) follow_further(all[before + i], INFINITY);
     });

@@ -242,7 +242,7 @@ void fit_fully(Trial& trial, int rounds) {
 }
 
 void settle(Trial& trial) {
-  trial.arrival.joint.solve({});
+  solve(trial.arrival, {});
   measure(trial);
   trial.is_settled = true;
 }

@@ -142,6 +142,29 @@ TEST(LawSearch, FindsNothingInANonlinearDecayThatIsNone) {
   EXPECT_FALSE(d.unexplained);
 }
 
+/// A corner that three swings reach, a little above the noise, where stiffness takes up most of the force: a search from what a step promises at another corner does not come near.
+TEST(LawSearch, FindsACornerThatFewSwingsReach) {
+  const double softer = -0.35 * stiffness, corner = 0.85;
+  FitProblem problem = two_decays([&](double x, double) { return -softer * std::max(0.0, x - corner); });
+  const Trial base = fit_baseline(problem);
+  EXPECT_GT(base.reduced_chi2(), 1.1);
+  EXPECT_LT(base.reduced_chi2(), 2);
+  const auto leaves_something = [](const Trial& t) { return what_remains(t).found; };
+  const std::vector<Trial> found = LawSearch(problem, base, leaves_something, never, LawSearch::Among::forms).search();
+  ASSERT_FALSE(found.empty());
+  EXPECT_EQ(found.front().effects, std::vector<std::string>{"law:spring on one side"});
+  EXPECT_FALSE(leaves_something(found.front()));
+  for (const Unknown& u : found.front().arrival.joint.unknowns()) {
+    const std::string& name = found.front().arrival.joint.parameter(u).name;
+    if (name == "law:spring on one side.k") {
+      EXPECT_NEAR(u.value / softer, 1, 0.2);
+    }
+    if (name == "law:spring on one side.s") {
+      EXPECT_NEAR(u.value, corner, 0.02);
+    }
+  }
+}
+
 /// A rig gets other laws while they are tried; the one beside which a second is looked for stays at work.
 TEST(LawSearch, FindsTheLawAtWorkInTheFitAndNotInTheRig) {
   FitProblem problem = two_decays(hidden.front().force);
