@@ -142,27 +142,44 @@ TEST(LawSearch, FindsNothingInANonlinearDecayThatIsNone) {
   EXPECT_FALSE(d.unexplained);
 }
 
-/// A corner that three swings reach, a little above the noise, where stiffness takes up most of the force: a search from what a step promises at another corner does not come near.
-TEST(LawSearch, FindsACornerThatFewSwingsReach) {
-  const double softer = -0.35 * stiffness, corner = 0.85;
-  FitProblem problem = two_decays([&](double x, double) { return -softer * std::max(0.0, x - corner); });
+/// Little above the noise the free decays are not fitted by themselves, and what a step to first order promises at the rig's own stiffness leaves more than no law does: it is followed all the same.
+TEST(LawSearch, FollowsWhatAStepDoesNotComeNear) {
+  constexpr double gap = 1.3, pull = 4e-4 * stiffness;
+  FitProblem problem = two_decays([](double x, double) { return pull * (std::pow(1 - x / gap, -2) - std::pow(1 + x / gap, -2)); });
   const Trial base = fit_baseline(problem);
-  EXPECT_GT(base.reduced_chi2(), 1.1);
+  EXPECT_GT(base.reduced_chi2(), 1.5);
   EXPECT_LT(base.reduced_chi2(), 2);
   const auto leaves_something = [](const Trial& t) { return what_remains(t).found; };
   const std::vector<Trial> found = LawSearch(problem, base, leaves_something, never, LawSearch::Among::forms).search();
   ASSERT_FALSE(found.empty());
-  EXPECT_EQ(found.front().effects, std::vector<std::string>{"law:spring on one side"});
-  EXPECT_FALSE(leaves_something(found.front()));
-  for (const Unknown& u : found.front().arrival.joint.unknowns()) {
-    const std::string& name = found.front().arrival.joint.parameter(u).name;
-    if (name == "law:spring on one side.k") {
-      EXPECT_NEAR(u.value / softer, 1, 0.2);
+  EXPECT_EQ(found.front().effects, std::vector<std::string>{"law:pull across two gaps"});
+  for (const Unknown& u : found.front().arrival.joint.unknowns())
+    if (found.front().arrival.joint.parameter(u).name == "law:pull across two gaps.g") {
+      EXPECT_NEAR(u.value, gap, 0.1);
     }
-    if (name == "law:spring on one side.s") {
-      EXPECT_NEAR(u.value, corner, 0.02);
+}
+
+/// Wherever a corner lies between a seventh of what the runs reach and nine tenths, one that is asked for first is near.
+TEST(Dictionary, AsksForCornersThroughoutTheReach) {
+  Reach reach;
+  reach.x = 0.01, reach.v = 0.3, reach.a = 9, reach.seconds = 10, reach.force = 20;
+  int corners = 0;
+  for (const Form& form : dictionary(one_mode::rig(), reach))
+    for (std::size_t k = 0; k < form.law.parameters.size(); ++k) {
+      const Parameter& p = form.law.parameters[k];
+      if (p.name != "s" || p.upper != reach.x) continue;
+      ++corners;
+      for (const Grid grid : {Grid::first, Grid::coarse, Grid::fine}) {
+        std::vector<double> asked;
+        for (const VectorXd& shape : shapes_of(form, grid)) asked.push_back(shape[static_cast<Index>(k)]);
+        for (double corner = 0.15 * reach.x; corner < 0.9 * reach.x; corner += 0.05 * reach.x) {
+          double nearest = INFINITY;
+          for (const double a : asked) nearest = std::min(nearest, std::abs(a - corner));
+          EXPECT_LE(nearest, (grid == Grid::fine ? 0.08 : 0.16) * reach.x) << form.law.name << ", " << corner;
+        }
+      }
     }
-  }
+  EXPECT_EQ(corners, 3) << "on one side, on the other, on both";
 }
 
 /// A rig gets other laws while they are tried; the one beside which a second is looked for stays at work.

@@ -113,7 +113,7 @@ double cost_of_starts(const unrig::Run& pluck) {
   const Trial base = fit_baseline(problem);
   Trial late = prepare(problem, base, {"channel-delay"});
   for (Unknown& u : late.arrival.joint.unknowns())
-    if (late.arrival.joint.parameter(u).name == "channel-delay.time") u.value = delay;
+    if (late.arrival.joint.parameter(u).name == "channel-delay.time") u.value = delay, u.held = true;  // beside free starts a pluck alone tells it to two samples
   settle(late);
   double unknowns = 0;
   for (const Unknown& u : late.arrival.joint.unknowns()) unknowns += u.held ? 0 : 1;
@@ -127,7 +127,8 @@ TEST(Bic, WhereAFilterStartsCostsWhatIsLikelyOfIt) {
   unrig::Run half = pluck;
   for (Channel& c : half.channels) c.value.conservativeResize(pluck.samples() / 2);
   const double late = cost_of_starts(pluck);
-  constexpr double negligible = 3, level = 12;  // beside what is decisive, 10; 2 ln of the swing over the noise, some 400, by which one sample tells the level that the delay was at
+  // Less than what is decisive, 10: the release weighs twice in the differences that tell the noise of the half, 1.2 times that of the whole, which is 2 ln 1.2 less for each of six states.
+  constexpr double negligible = 6, level = 12;  // 2 ln of the swing over the noise, some 400, by which one sample tells the level that the delay was at
   EXPECT_NEAR(cost_of_starts(half), late, negligible);
   EXPECT_GT(late, level);
   EXPECT_LT(late, 6 * std::log(static_cast<double>(pluck.samples())));
