@@ -43,12 +43,6 @@ Sensor sensor(const std::string& column, SensorKind reads, int element, double g
   return s;
 }
 
-Sensor bridge(int element, CalibrationRow row) {
-  Sensor s = sensor("bridge", SensorKind::load, element, 1);
-  s.row = row;
-  return s;
-}
-
 /// The seed's rig with a sensor of every kind.
 const Rig& seed_rig() {
   static const Rig rig = [] {
@@ -58,7 +52,8 @@ const Rig& seed_rig() {
                  sensor("acceleration", SensorKind::acceleration, 16, -1),
                  sensor("twist", SensorKind::twist, 13, 2),
                  sensor("twist_rate", SensorKind::twist_rate, 13, 2),
-                 bridge(5, {0.3, -0.7, 1.6})};
+                 sensor("bridge", SensorKind::load, 5, 1)};
+    r.sensors.back().row = {0.3, -0.7, 1.6};
     return r;
   }();
   return rig;
@@ -249,66 +244,6 @@ TEST(AeroelasticModel, StandsAsItsFlexibilitySaysUnderASteadyForce) {
   EXPECT_NEAR(y[0], 1, 1e-9) << "the gauge is calibrated by dead weights at this station";
   // The modes that rounding has made up of the printed matrix are left out: its digits, 5e-4.
   EXPECT_NEAR(-y[1] / (rig.normal.flexibility(15, c) / 0.8), 1, 5e-4);
-}
-
-/// Loads outboard, inertial ones included, are what the undamped shaft transmits: elastic forces A^-1 w of its elements, whatever acts and moves. Needs every mode.
-TEST(AeroelasticModel, ABridgeReadsWhatTheShaftTransmits) {
-  Rig rig = read_rig(test::source_path("sample_data/seed/rig_from_drawings.toml"));
-  const Modes normal = chain_modes(rig.normal), torsion = chain_modes(rig.torsion);
-  ASSERT_EQ(normal.omega.size(), rig.station.size());
-  ASSERT_EQ(torsion.omega.size(), rig.torsion.inertia.size());
-  Conditions conditions = stream(0.6);
-  conditions.force = conditions.mount = true;
-  for (const int element : {2, 7, 12})
-    for (const CalibrationRow& row : {CalibrationRow{1, 0, 0}, CalibrationRow{0, 1, 0}, CalibrationRow{0, 0, 1}, CalibrationRow{0.5, -2, 3}}) {
-      rig.sensors = {bridge(element, row)};
-      const AeroelasticModel model(rig, make_basis(rig, normal.omega.size(), torsion.omega.size()), wagner(Wagner::jones));
-      const double kn = 0.8, kt = 0.9;
-      const VectorXd theta = theta_with(model, {{"normal.stiffness_scale", kn}, {"torsion.stiffness_scale", kt}, {"normal.damping_ratio", 0}, {"torsion.damping_ratio", 0}, {"apparent_mass_coefficient", 1.1}});
-      const LinearSystem s = model.system(conditions, theta, {"bridge"});
-      const MatrixXd forces = kn * rig.normal.flexibility.llt().solve(model.basis().normal), couples = kt * rig.torsion.flexibility.llt().solve(model.basis().torsion_chain);
-      RowVectorXd expected = RowVectorXd::Zero(s.states());
-      for (Index i = element; i < rig.station.size(); ++i) expected.head(s.coordinates) += (row.per_force + row.per_bending_moment * (rig.station[i] - rig.station[element - 1])) * forces.row(i);
-      for (Index j = element; j < rig.torsion.inertia.size(); ++j) expected.head(s.coordinates) += row.per_torque * couples.row(j);
-      // Of the coordinates each by itself: those of stiff modes read millions of times what those of soft ones do.
-      const RowVectorXd read = s.C.value.row(0), scale = s.C.value.row(0).cwiseAbs();
-      for (Index i = 0; i < s.coordinates; ++i) EXPECT_NEAR(read[i], expected[i], 1e-6 * std::max(scale[i], expected.cwiseAbs().maxCoeff() * 1e-6)) << element << ", coordinate " << i;
-      const double one_degree_of_turn = expected.cwiseAbs().maxCoeff() * 1e-9;
-      EXPECT_LT(read.tail(s.states() - s.coordinates).cwiseAbs().maxCoeff(), one_degree_of_turn) << element;
-      EXPECT_LT(s.D.value.cwiseAbs().maxCoeff(), one_degree_of_turn) << element;
-    }
-}
-
-TEST(AeroelasticModel, ABridgeInTheGaugesPlaceReadsWhatTheGaugeReads) {
-  Rig rig = seed_rig();
-  const double lever = rig.station[rig.calibration_element - 1] - rig.station[rig.gauge_element - 1];
-  rig.sensors = {bridge(rig.gauge_element, {0, 1 / lever, 0})};
-  const AeroelasticModel model(rig, make_basis(rig, Index{3}, Index{1}), wagner(Wagner::jones));
-  Conditions conditions = stream(0.6);
-  conditions.force = conditions.mount = true;
-  const LinearSystem s = model.system(conditions, model.start_values(), {"gauge", "bridge"});
-  EXPECT_GT(s.C.value.row(0).norm(), 0);
-  EXPECT_LT((s.C.value.row(0) - s.C.value.row(1)).norm(), 1e-14 * s.C.value.row(0).norm());
-  EXPECT_LT((s.D.value.row(0) - s.D.value.row(1)).norm(), 1e-14 * s.D.value.row(0).norm());
-}
-
-/// A steady circulatory load acts at the quarter chord: what it bends and twists of a bridge inboard of the strips is their sum and its arm.
-TEST(AeroelasticModel, ABridgeReadsTheSteadyLoadAtTheQuarterChord) {
-  Rig rig = seed_rig();
-  rig.pitch_axis = 0.4;
-  const double expected = 2 * pi * water * 0.6 * 0.6 * rig.semichord() * rig.strip_length * 3, arm = 0.15 * rig.chord;
-  const auto steady = [&](CalibrationRow row) {
-    rig.sensors = {bridge(3, row)};
-    const AeroelasticModel model(rig, make_basis(rig, Index{2}, Index{1}), wagner(Wagner::jones));
-    VectorXd theta = model.start_values();
-    theta[model.index("normal.stiffness_scale")] = theta[model.index("torsion.stiffness_scale")] = 1e9;  // twist adds no angle
-    const LinearSystem s = model.system(stream(0.6), theta, {"bridge"});
-    const Index free = s.free_states();
-    const VectorXd x = -s.A.value.topLeftCorner(free, free).partialPivLu().solve(s.A.value.col(s.motion).head(free));
-    return s.C.value(0, s.motion) + s.C.value.row(0).head(free).dot(x);
-  };
-  EXPECT_NEAR(steady({1, 0, 0}) / expected, 1, 1e-6);
-  EXPECT_NEAR(steady({0, 0, 1}) / (expected * arm), 1, 1e-6);
 }
 
 TEST(AeroelasticModel, VelocityAndAccelerationAreTheSlopesOfDisplacement) {

@@ -109,12 +109,23 @@ TEST_F(Simulate, StepStartsAndEndsSteady) {
 }
 
 TEST_F(Simulate, SteadyNormalForceReplacesTheLinearOne) {
-  SimulateProblem p = problem(model_of("seed/rig_from_drawings.toml", 2), step());
+  Rig rig = read_rig(sample("seed/rig_from_drawings.toml"));
+  Sensor shear;
+  shear.column = "shear";
+  shear.reads = SensorKind::load;
+  shear.element = 2;
+  shear.row.per_force = 1;
+  shear.unit = "N";
+  rig.sensors.push_back(shear);
+  SimulateProblem p = problem({rig, make_basis(rig, Index{2}, Index{1}), wagner(Wagner::within_1e4)}, step());
   const unrig::Run linear = simulate(p).run;
   p.steady_normal_force = 0.5;
   const unrig::Run given = simulate(p).run;
   const double unit = reading_of_unit_coefficient(p.model.rig(), gauge_levers(p.model.rig()), 998.2, 0.6);
   EXPECT_NEAR(given.channel("gauge").value[0], 0.5 * unit, 1e-12 * unit);
+  const double load = 0.5 * 998.2 * 0.6 * 0.6 * rig.semichord() * 3 * rig.strip_length;
+  EXPECT_NEAR(given.channel("shear").value[0], load, 1e-12 * load) << "a bridge inboard of all strips";
+  EXPECT_EQ(given.channel("tip_displacement").value, linear.channel("tip_displacement").value);
   const VectorXd shift = given.channel("gauge").value - linear.channel("gauge").value;
   EXPECT_LT((shift.array() - shift[0]).abs().maxCoeff(), 1e-12 * unit) << "a constant of the run";
 }
