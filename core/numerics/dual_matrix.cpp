@@ -3,6 +3,8 @@
 #include <Eigen/LU>
 #include <cmath>
 
+#include "core/numerics/product.h"
+
 namespace unrig {
 namespace {
 
@@ -100,20 +102,14 @@ DualMatrix operator*(double factor, const DualMatrix& a) {
 DualMatrix operator-(const DualMatrix& a, const DualMatrix& b) { return a + (-1.0) * b; }
 
 DualMatrix operator*(const DualMatrix& a, const DualMatrix& b) {
-  DualMatrix product(a.value * b.value);
-  product.partial = merge_partials(a, b, [&](Index j) -> MatrixXd {
-    MatrixXd d(a.rows(), b.cols());
-    if (a.depends_on(j) && b.depends_on(j)) {
-      d.noalias() = a.d(j) * b.value;
-      d.noalias() += a.value * b.d(j);
-    } else if (a.depends_on(j)) {
-      d.noalias() = a.d(j) * b.value;
-    } else {
-      d.noalias() = a.value * b.d(j);
-    }
+  DualMatrix result(product(a.value, b.value));
+  result.partial = merge_partials(a, b, [&](Index j) -> MatrixXd {
+    if (!a.depends_on(j)) return product(a.value, b.d(j));
+    MatrixXd d = product(a.d(j), b.value);
+    if (b.depends_on(j)) add_product(a.value, b.d(j), d);
     return d;
   });
-  return product;
+  return result;
 }
 
 DualMatrix operator*(const MatrixXd& constant, const DualMatrix& a) { return DualMatrix(constant) * a; }

@@ -16,7 +16,7 @@ void small_product(const double* a, Eigen::Index padded_rows, Eigen::Index inner
   static const bool wide = __builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma");
   if (wide) return small_product_avx2(a, padded_rows, inner, b, b_stride, columns, c, c_stride);
 #endif
-  all_stripes<2>(a, padded_rows, inner, b, b_stride, columns, c, c_stride);
+  all_stripes<2>(a, padded_rows, padded_rows, inner, b, b_stride, columns, c, c_stride);
 }
 
 }  // namespace unrig

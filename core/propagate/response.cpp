@@ -7,6 +7,7 @@
 
 #include <fmt/format.h>
 
+#include "core/numerics/product.h"
 #include "core/numerics/work.h"
 
 namespace unrig {
@@ -58,18 +59,20 @@ DualMatrix without_dust(DualMatrix state) {
 
 MatrixXd identity_like(const MatrixXd& m) { return MatrixXd::Identity(m.rows(), m.cols()); }
 DualMatrix identity_like(const DualMatrix& m) { return DualMatrix(MatrixXd(MatrixXd::Identity(m.rows(), m.cols())), m.parameters()); }
+MatrixXd times(const MatrixXd& a, const MatrixXd& b) { return product(a, b); }
+DualMatrix times(const DualMatrix& a, const DualMatrix& b) { return a * b; }
 
 }  // namespace
 
 template <class Matrix>
 Matrix power(Matrix m, Index exponent) {
-  Matrix product = identity_like(m);
+  Matrix result = identity_like(m);
   bool one = true;
   for (; exponent > 0; exponent /= 2) {
-    if (exponent % 2 == 1) product = one ? m : Matrix(product * m), one = false;
-    if (exponent > 1) m = Matrix(m * m);
+    if (exponent % 2 == 1) result = one ? m : times(result, m), one = false;
+    if (exponent > 1) m = times(m, m);
   }
-  return product;
+  return result;
 }
 template MatrixXd power(MatrixXd, Index);
 template DualMatrix power(DualMatrix, Index);
@@ -164,7 +167,7 @@ Response drive(const LinearSystem& system, const ExactStep& step, const DualMatr
       if (has_input && system.D.depends_on(j)) outputs.col(1 + a).noalias() += system.D.d(j) * input.row(k).transpose();
       response.partial[static_cast<std::size_t>(j)].row(k) = outputs.col(1 + a).transpose();
     }
-    next.noalias() = step.transition.value * state;
+    set_product(step.transition.value, state, next);
     if (count > 0) forcing.noalias() = stacked * state.col(0);
     if (has_jerk) {
       next.col(0) += jerk[k] * step.jerk.value.col(0);

@@ -6,6 +6,7 @@
 #include "core/propagate/exact_step.h"
 #include "core/propagate/nonlinear_response.h"
 #include "core/numerics/in_parallel.h"
+#include "core/numerics/product.h"
 #include "core/numerics/work.h"
 
 namespace unrig {
@@ -38,11 +39,11 @@ Walk walk_of(const LinearSystem& system, double dt) {
 MatrixXd riccati(MatrixXd A, MatrixXd S, MatrixXd X) {
   constexpr int most = 60;
   for (int i = 0; i < most; ++i) {
-    const MatrixXd inverse = (MatrixXd::Identity(A.rows(), A.cols()) + S * X).inverse();
-    const MatrixXd change = A.transpose() * X * inverse * A;
-    S += A * inverse * S * A.transpose();
+    const MatrixXd inverse = (MatrixXd::Identity(A.rows(), A.cols()) + product(S, X)).inverse();
+    const MatrixXd change = product(product(product(A.transpose(), X), inverse), A), carried = product(A, inverse);
+    add_product(product(carried, S), A.transpose(), S);
     X += change;
-    A = (A * inverse * A).eval();
+    A = product(carried, A);
     X = (0.5 * (X + X.transpose())).eval();
     S = (0.5 * (S + S.transpose())).eval();
     if (!(change.norm() > 1e-14 * X.norm())) break;
@@ -142,7 +143,7 @@ MatrixXd ForceFilter::innovations_of_forces(const MatrixXd& forces, const Vector
     if (counts[k] == 0) e.setZero();
     out.col(k) = e.transpose();
     state.noalias() -= gain_ * e;
-    next.noalias() = forward_ * state;
+    set_product(forward_, state, next);
     next.leftCols(known).noalias() += input0_ * per_sample.col(k).transpose();
     if (k + 1 < samples) next.leftCols(known).noalias() += input1_ * per_sample.col(k + 1).transpose();
     state.swap(next);

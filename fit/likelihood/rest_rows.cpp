@@ -1,5 +1,6 @@
 #include "fit/likelihood/rest_rows.h"
 
+#include "core/numerics/product.h"
 #include "fit/likelihood/run_linearised.h"
 
 namespace unrig::rest_rows {
@@ -58,7 +59,7 @@ FreeRows::FreeRows(MatrixXd free_rows) : rows(std::move(free_rows)) {
 bool FreeRows::is_smooth(const MatrixXd& state, const MatrixXd& before) const {
   constexpr double rounding = 1e-11;
   if (rough.size() == 0) return false;
-  return ((rough * state).colwise().norm().array() <= rounding * (size * before).colwise().norm().array()).all();
+  return (product(rough, state).colwise().norm().array() <= rounding * product(size, before).colwise().norm().array()).all();
 }
 
 SmoothResponse::SmoothResponse(const FreeResponse& free) : leap_(free.leap()) {

@@ -1,3 +1,4 @@
+#include "core/numerics/product.h"
 #include "fit/likelihood/run_linearised.h"
 
 // Rotations of the rows of one channel over one phase of the record.
@@ -35,7 +36,7 @@ MatrixXd Block::join(const std::vector<MatrixXd>& spans, Index offset, Index off
     joint_ = std::make_shared<const Householder>(std::move(span));
     span = joint_->triangle();
   }
-  MatrixXd reach = span.leftCols(states) * start;
+  MatrixXd reach = product(span.leftCols(states), start);
   reach.middleCols(offset, offsets) += span.rightCols(offsets);
   return reach;
 }

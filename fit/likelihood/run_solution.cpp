@@ -2,6 +2,7 @@
 #include <cmath>
 #include <optional>
 
+#include "core/numerics/product.h"
 #include "core/propagate/nonlinear_response.h"
 #include "fit/likelihood/run_linearised.h"
 #include "fit/likelihood/wandering_force.h"
@@ -112,7 +113,7 @@ MatrixXd RunResidual::motion_state_columns(const Linearised& lin, const Interval
 
 /// d state / d c behind a phase, from that at its start.
 MatrixXd RunResidual::state_behind(const Linearised& lin, const MotionBasis::Phase& phase, const Interval& samples, const MatrixXd& start) const {
-  MatrixXd behind = power(lin.step.transition.value, samples.length()) * start;
+  MatrixXd behind = product(power(lin.step.transition.value, samples.length()), start);
   if (phase.moving && motion_.unknowns() > 0) behind.leftCols(motion_.unknowns()) += motion_state_columns(lin, samples);
   if (phase.moving && samples.last < run_->samples()) {
     RowVectorXd angle = RowVectorXd::Zero(start.cols());
@@ -129,7 +130,7 @@ Index RunResidual::smooth_from(const Linearised& lin, const Interval& samples, c
   constexpr Index length = rest_rows::stretch_samples;
   if (!lin.polynomials) return samples.last;
   MatrixXd state = start;
-  for (Index first = samples.first; first + 2 * length <= samples.last; first += length, state = lin.leap * state)
+  for (Index first = samples.first; first + 2 * length <= samples.last; first += length, state = product(lin.leap, state))
     if (std::all_of(lin.free.begin(), lin.free.end(), [&](const rest_rows::FreeRows& free) { return free.is_smooth(state, start); })) return first + length;
   return samples.last;
 }
@@ -143,7 +144,7 @@ MatrixXd RunResidual::reach_at_rest(const Linearised& lin, run_rows::Block& bloc
   for (Index first = block.samples.first; first < block.samples.last; first += rest_rows::stretch_samples) {
     const Interval stretch{first, std::min(first + rest_rows::stretch_samples, block.samples.last)};
     if (block.is_smooth(stretch)) {
-      smooth_since = smooth_since.size() > 0 ? MatrixXd(smooth_since * lin.leap) : MatrixXd(free.smooth * since);
+      smooth_since = smooth_since.size() > 0 ? product(smooth_since, lin.leap) : product(free.smooth, since);
       const rest_rows::SmoothReadings& readings = smooth_readings(block.channel, stretch);
       MatrixXd span(rest_rows::smooth_terms, n + 1);
       span << readings.weight * smooth_since, readings.weight * rest_rows::smooth_constant();
@@ -162,9 +163,9 @@ MatrixXd RunResidual::reach_at_rest(const Linearised& lin, run_rows::Block& bloc
       span << w.asDiagonal() * free.rows.topRows(stretch.length()), w.asDiagonal() * offsets;
       span = block.add_stretch(std::move(span));
     }
-    span.leftCols(n) *= since;
+    span.leftCols(n) = product(span.leftCols(n), since);
     spans.push_back(std::move(span));
-    since = since * lin.leap;
+    since = product(since, lin.leap);
   }
   return block.join(spans, lin.offsets_from(*this, block.channel), lin.wandering ? measured_.cols() : 1);
 }

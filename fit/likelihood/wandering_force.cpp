@@ -3,6 +3,8 @@
 #include <Eigen/LU>
 #include <cmath>
 
+#include "core/numerics/product.h"
+
 namespace unrig {
 
 using Eigen::Index;
@@ -42,11 +44,11 @@ MatrixXd steady_covariance(const MatrixXd& transition, const MatrixXd& observe, 
   const Index n = transition.rows();
   MatrixXd a = transition.transpose(), g = observe.transpose() * variance.cwiseInverse().asDiagonal() * observe, h = process;
   for (int i = 0; i < most_doublings; ++i) {
-    const Eigen::PartialPivLU<MatrixXd> w(MatrixXd::Identity(n, n) + g * h);
+    const Eigen::PartialPivLU<MatrixXd> w(MatrixXd::Identity(n, n) + product(g, h));
     const MatrixXd wa = w.solve(a), wg = w.solve(g);
-    const MatrixXd more = a.transpose() * h * wa;
-    g += a * wg * a.transpose();
-    a = (a * wa).eval();
+    const MatrixXd more = product(product(a.transpose(), h), wa);
+    add_product(product(a, wg), a.transpose(), g);
+    a = product(a, wa);
     h += more;
     h = 0.5 * (h + h.transpose()).eval();
     g = 0.5 * (g + g.transpose()).eval();
@@ -58,10 +60,10 @@ MatrixXd steady_covariance(const MatrixXd& transition, const MatrixXd& observe, 
 /// X with X = F X F^T + M.
 MatrixXd lyapunov(MatrixXd f, MatrixXd m) {
   for (int i = 0; i < most_doublings; ++i) {
-    const MatrixXd more = f * m * f.transpose();
+    const MatrixXd more = product(product(f, m), f.transpose());
     m += more;
     if (more.norm() <= rounding * m.norm()) break;
-    f = (f * f).eval();
+    f = product(f, f);
   }
   return m;
 }
@@ -96,7 +98,7 @@ WanderingForce::WanderingForce(const DualMatrix& noise, const VectorXd& sigma, c
     if (!step.transition.depends_on(j) && !system.C.depends_on(j) && !kicks.depends_on(j)) continue;
     const MatrixXd da = step.transition.depends_on(j) ? MatrixXd(step.transition.d(j)(reached_, reached_)) : MatrixXd::Zero(m, m);
     const MatrixXd dc = system.C.depends_on(j) ? MatrixXd(system.C.d(j)(Eigen::all, reached_)) : MatrixXd::Zero(channels, m);
-    MatrixXd half = (da - gain_ * dc) * known * closed.transpose();  // the gain itself is where P is stationary
+    MatrixXd half = product(product(da - gain_ * dc, known), closed.transpose());  // the gain itself is where P is stationary
     if (kicks.depends_on(j)) half += kicks.d(j)(reached_, Eigen::all) * drive.transpose();
     const MatrixXd dp = lyapunov(closed, half + half.transpose());
     const MatrixXd across = observe * known * dc.transpose(), ds = across + across.transpose() + observe * dp * observe.transpose();
@@ -112,7 +114,7 @@ WanderingForce::WanderingForce(const DualMatrix& noise, const VectorXd& sigma, c
   raised_.assign(static_cast<std::size_t>(channels), MatrixXd(samples, channels));
   slopes_.resize(static_cast<std::size_t>(parameters));
   for (const Moved& one : moved) slopes_[static_cast<std::size_t>(one.parameter)].resize(samples, channels * (1 + channels));
-  MatrixXd state = MatrixXd::Zero(m, 1 + channels), now = MatrixXd::Identity(channels, 1 + channels);
+  MatrixXd state = MatrixXd::Zero(m, 1 + channels), next(m, 1 + channels), now = MatrixXd::Identity(channels, 1 + channels);
   now.rightCols(channels).setIdentity();
   for (Index k = 0; k < samples; ++k) {
     now.col(0) = readings.row(k).transpose();
@@ -122,9 +124,14 @@ WanderingForce::WanderingForce(const DualMatrix& noise, const VectorXd& sigma, c
     for (Moved& one : moved) {
       const MatrixXd slope = -(one.observe * state + observe * one.state);
       slopes_[static_cast<std::size_t>(one.parameter)].row(k) = slope.reshaped().transpose();
-      one.state = (closed * one.state + one.closed * state + one.gain * now).eval();
+      set_product(closed, one.state, next);
+      add_product(one.closed, state, next);
+      next.noalias() += one.gain * now;
+      one.state.swap(next);
     }
-    state = (closed * state + gain_ * now).eval();
+    set_product(closed, state, next);
+    next.noalias() += gain_ * now;
+    state.swap(next);
   }
 
   step.transition = step.transition - gain * system.C;
