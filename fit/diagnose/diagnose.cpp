@@ -37,8 +37,6 @@ namespace {
 
 using Eigen::Index;
 
-constexpr double twice_the_noise = 2;
-
 /// The fit with nothing missing and every run at its full weight, from where the baseline stands; `thorough`: or from first guesses and the starts around them, as `unrig fit` searches, where that leaves less. Whether it
 /// leaves so much less that the baseline, from which all else was searched, was no place to begin from.
 struct PlainFit {
@@ -51,7 +49,6 @@ PlainFit plain_fit(const FitProblem& problem, const Arrival& baseline, bool thor
   solve(plain.arrival);
   if (!thorough) return plain;
   Arrival anew = arrive(problem, baseline.model);
-  constexpr double hardly_less = 0.9;
   const double before = plain.arrival.joint.chi2(), after = anew.joint.chi2();
   plain.baseline_was_lost = after < hardly_less * before;
   if (after < before) plain.arrival = std::move(anew);

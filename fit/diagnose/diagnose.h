@@ -20,8 +20,6 @@
 
 namespace unrig {
 
-constexpr double enough_to_name = 0.97;  ///< share of the excess that effects must remove to be named where something remains
-
 /// What `unrig diagnose` and `unrig trial` allow a search where nothing else is asked [1e9 multiplications], and `unrig diagnose` above it [s of the processor].
 constexpr double usual_work = 400, usual_seconds = 60;
 

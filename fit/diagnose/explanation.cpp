@@ -12,11 +12,9 @@
 namespace unrig {
 namespace {
 
-constexpr double half = 0.5;  // of the excess, where decays decide: the search leaves something of the other runs even when it has found what is missing
-
 /// Whether decays that decide are followed, to the noise or in nearly all that they had above it.
 bool follows_decays(const Trial& trial, const Trial& baseline) {
-  if (!decays_decide(trial) || trial.excess() > half * baseline.excess()) return false;
+  if (!decays_decide(trial) || trial.excess() > half_of_it * baseline.excess()) return false;  // the search leaves something of the other runs even when it has found what is missing
   const bool nearly = trial.decays.exactly && left_of_decays(trial) - 1 < (1 - enough_to_name) * (left_of_decays(baseline) - 1);
   return trial.decays.chi2 < explained || nearly;
 }

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "fit/search/find_motion.h"
+#include "fit/search/search_numbers.h"
 #include "fit/uncertainty/undetermined.h"
 
 namespace unrig {
@@ -44,7 +45,7 @@ HeldoutResidual predict_heldout(const Arrival& arrival, const Run& run) {
   options.precision = 0.1;  // what is predicted moves by less than its own noise
   options.most_evaluations = 15;
   RunResidual& residual = joint.runs().front();
-  if (residual.takes_small_steps(joint.theta(0))) options.enough = 1.02;  // slopes at corners promise more than steps keep; one per cent of it is chance
+  if (residual.takes_small_steps(joint.theta(0))) options.enough = to_the_noise;  // slopes at corners promise more than steps keep
   residual.follow_in(arrival.joint.runs().front().finer());
   find_motion(residual, joint.theta(0));
   joint.solve(options);

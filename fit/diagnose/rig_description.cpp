@@ -133,8 +133,8 @@ std::optional<RigDescription> describe_rig(const DiagnoseProblem& problem, const
   // Near the noise the excess is uncertain by chance as much: chi-square by sqrt(2 n).
   constexpr double by_chance = 2;
   const double left = arrival.joint.chi2() - gain, noise = from.effects.empty() ? explained * freedom : freedom + by_chance * std::sqrt(2 * freedom);
-  const bool is_near = from.effects.empty() || leaves_nothing(from), to_the_noise = is_near && gain > decisive && left < noise;
-  if (!(promised > least) && !to_the_noise) return gain > decisive && !has_colour(arrival.joint) ? in_the_noise_behind_a_step(problem, from, inexact, arrival) : std::nullopt;
+  const bool is_near = from.effects.empty() || leaves_nothing(from), comes_to_it = is_near && gain > decisive && left < noise;
+  if (!(promised > least) && !comes_to_it) return gain > decisive && !has_colour(arrival.joint) ? in_the_noise_behind_a_step(problem, from, inexact, arrival) : std::nullopt;
 
   constexpr double worth_a_step = 0.01;  // of what is left: numbers that explain it are found in steps that promise far more
   inexact.search(arrival, worth_a_step);

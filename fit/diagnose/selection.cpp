@@ -24,12 +24,6 @@ using Strings = std::vector<std::string>;
 using Trials = std::vector<Trial>;  // the best first once they are fitted
 using Tell = std::function<void(const std::string&)>;
 
-constexpr double twice_the_noise = 2;
-constexpr double quarter_of_it = 0.25;  // of what the best promises to first order: less is not worth a fit
-constexpr double hardly_less = 0.9;  // of the excess: an effect that leaves so much of it is not what is missing
-constexpr std::size_t most_refits = 5, most_in_full = 2;
-constexpr std::size_t few = 7;  // candidates that are all worth a fit
-
 /// A few rounds for all, the rest for those that are ahead.
 void fit_linear(Trials& trials) {
   in_parallel(trials.size(), [&](std::size_t i) { hold_undetermined(trials[i]); });
@@ -219,12 +213,11 @@ Trials Selection::try_one_more(const Trial& base, const Strings& hopeless) {
     if (brings_a_law(*trial) && !far && !may_be_seen(*trial, base)) continue;
     if (!promises_nothing && takes_too_little(*trial, base)) continue;
     if (is_first(base) && follows_law && trial->score < 0) continue;  // dear to follow; a filter, which far away promises as little, is not
-    if (prepared.size() <= few || promises_nothing || promises || step_says_nothing) (follows_law ? others : linear).push_back(std::move(*trial));
+    if (prepared.size() <= few_candidates || promises_nothing || promises || step_says_nothing) (follows_law ? others : linear).push_back(std::move(*trial));
     else if (!follows_law) unpromising.push_back(std::move(*trial));
   }
   // Linear effects first, which are an order faster; nonlinear ones where none of those leaves nothing, and those that promise as much.
-  constexpr double clearly = 0.8;
-  const double by_linear = linear.empty() ? 0 : clearly * linear.front().score;
+  const double by_linear = linear.empty() ? 0 : as_much * linear.front().score;
   const bool favours_linear = others.empty() || (!linear.empty() && by_linear >= others.front().score);
   fit_linear(linear);
   keep_distinct(linear);

@@ -22,9 +22,6 @@
 namespace unrig {
 namespace {
 
-constexpr std::size_t most_in_full = 5;
-constexpr double other_shapes = 0.25;  // of what is promised without forms: one that promises less at its first shape is not asked at others (tests/studies/LAWS.md)
-
 /// Ascending in a number that is asked for once of each; what is none comes last.
 template <class T, class Key>
 void sort_by(std::vector<T>& all, Key key) {
@@ -105,14 +102,14 @@ std::vector<std::string> LawSearch::forms_worth_a_fit(const Trial& base, const P
   for (Form& form : at_first) form.starts = shapes_of(form, Grid::first);
   const std::vector<double> at_first_shape = screen_forms(base, screening, at_first, all);
   // At its best shape a form promises up to some times of that.
-  std::erase_if(all, [&](std::size_t i) { return !(at_first_shape[i] > other_shapes * std::max(known.by_a_law, known.by_a_signal)); });
+  std::erase_if(all, [&](std::size_t i) { return !(at_first_shape[i] > quarter_of_it * std::max(known.by_a_law, known.by_a_signal)); });
   for (const std::size_t i : all) forms[i].starts = shapes_of(forms[i], Grid::coarse);
   const std::vector<double> promise = screen_forms(base, screening, forms, all);
   std::vector<std::size_t> order;
   for (std::size_t i = 0; i < forms.size(); ++i)
     if (promise[i] > 0) order.push_back(i);
   sort_by(order, [&](std::size_t i) { return -promise[i]; });
-  if (order.size() > most_in_full) order.resize(most_in_full);
+  if (order.size() > most_refits) order.resize(most_refits);
   std::erase_if(order, [&](std::size_t i) { return promise[i] < half_of_it * promise[order.front()]; });
 
   problem_.rig.laws = at_work;
@@ -149,7 +146,7 @@ std::vector<LawSearch::AskedFor> LawSearch::asked_by_decays() const {
   }
   sort_by(asked, [](const AskedFor& a) { return -a.evidence; });
   if (!asked.empty()) std::erase_if(asked, [most = asked.front().evidence](const AskedFor& a) { return !(a.evidence > decisive) || a.evidence < half_of_it * most; });
-  if (asked.size() > most_in_full) asked.resize(most_in_full);
+  if (asked.size() > most_refits) asked.resize(most_refits);
   return asked;
 }
 
@@ -245,7 +242,6 @@ void LawSearch::follow_decays(Trial& trial, const Trial& base, bool from_here) c
 /// The simplest first.
 void LawSearch::in_order_of_parameters(std::vector<Trial>& tried) const {
   sort_by(tried, [&](const Trial& t) {
-    constexpr double far_dearer = 100;  // what follows its runs in small steps, than a further parameter
     const auto parameters = static_cast<double>(effect(problem_.rig, t.effects.back()).parameters_on(problem_.rig).size());
     return parameters + (decays_decide(t) ? far_dearer : 0) - std::clamp(t.score, 0.0, 1.0);
   });

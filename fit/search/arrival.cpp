@@ -14,6 +14,7 @@
 #include "fit/search/first_guess.h"
 #include "fit/search/modal_start.h"
 #include "fit/search/mode_order.h"
+#include "fit/search/search_numbers.h"
 #include "fit/likelihood/readings_noise.h"
 #include "fit/uncertainty/undetermined.h"
 
@@ -84,8 +85,6 @@ void follow(Arrival& arrival, const FitProblem& problem, const std::vector<Index
   }
 }
 
-constexpr double followed_chi2 = 2;  // reduced chi-square of a record that a model can be said to follow
-
 /// Start values around those of `joint`: stiffness of torsion (of modal rigs: of every second mode) and of the others times a factor each, and damping ratios of modes that a
 /// resonance nearby still moves.
 void spread(JointProblem& joint, double torsion, double others) {
@@ -129,7 +128,7 @@ Arrival grow(Arrival start, const FitProblem& problem, const ArrivalEffort& effo
   const std::vector<Index> horizons = growing_horizons(problem.runs);
   Arrival arrival = start;
   follow(arrival, problem, horizons, 0, horizons.size(), effort);
-  if (!effort.other_starts || horizons.size() < 2 || arrival.reduced_chi2() < followed_chi2) return arrival;
+  if (!effort.other_starts || horizons.size() < 2 || arrival.reduced_chi2() < twice_the_noise) return arrival;
   Arrival other = try_other_starts(start, problem, horizons, effort);
   return other.reduced_chi2() < arrival.reduced_chi2() ? other : arrival;
 }
@@ -137,7 +136,7 @@ Arrival grow(Arrival start, const FitProblem& problem, const ArrivalEffort& effo
 /// Whether the fit follows its runs to their noise, that of measured inputs included.
 bool follows(Arrival arrival) {
   for (std::size_t r = 0; r < arrival.joint.runs().size(); ++r) arrival.joint.runs()[r].settle_noise(arrival.joint.theta(r));
-  return arrival.reduced_chi2() < followed_chi2;
+  return arrival.reduced_chi2() < twice_the_noise;
 }
 
 /// Of a rig known as modes: over the whole record at once, from the first guess and from the recordings' spectra. A window that grows may lose a mode that is near where it should be:
@@ -264,12 +263,12 @@ Arrival arrive_with_effects(const FitProblem& problem, const Arrival& like, cons
 void look_elsewhere(Arrival& arrival) {
   if (arrival.model->rig().is_modal()) return;
   const JointProblem& joint = arrival.joint;
-  const bool explained = std::all_of(joint.runs().begin(), joint.runs().end(), [&, r = std::size_t{0}](const RunResidual& run) mutable {
+  const bool as_expected = std::all_of(joint.runs().begin(), joint.runs().end(), [&, r = std::size_t{0}](const RunResidual& run) mutable {
     const auto freedom = static_cast<double>(run.degrees_of_freedom());
     constexpr double chance = 2;  // standard deviations: what it costs is a fit of twice the time
     return run.evaluate(joint.theta(r++), Partials::none).chi2 < freedom * (1 + chance * std::sqrt(2 / freedom));
   });
-  if (explained) return;
+  if (as_expected) return;
   constexpr double clearly = 25, far = 1.5;  // five standard deviations; a factor of stiffness
   for (const auto& [torsion, normal] : {std::pair{1 / far, 1.0}, {far, 1.0}, {1.0, 1 / far}, {1.0, far}}) {
     Arrival other = arrival;

@@ -429,10 +429,10 @@ DecaysLeft fit_decays(JointProblem& joint, const std::string& id, bool from_here
         if (Followed others = follow_round_corners(*other); others.left < found.left) found = std::move(others);
         if (other->better_than(*best)) best = std::move(other);
       }
-    constexpr double to_the_noise = 1.05, nearly = 1.5;  // trajectories that cross the corners for seconds have least chi-squares everywhere; few are the deepest
+    constexpr double deepest = 1.05, nearly = 1.5;  // trajectories that cross the corners for seconds have least chi-squares everywhere; few are the deepest
     std::vector<ChannelColour> noise;
-    if (!(found.most_left < to_the_noise) && found.left < nearly_explained) noise = noise_left_of_decays(found.joint);
-    const bool to_its_noise = found.most_left < to_the_noise || !noise.empty();
+    if (!(found.most_left < deepest) && found.left < nearly_explained) noise = noise_left_of_decays(found.joint);
+    const bool to_its_noise = found.most_left < deepest || !noise.empty();
     if (!to_its_noise) best->fit(GrowingTrust::trusted_levels);
     if (to_its_noise || (found.left < nearly && best->left_as_trusted() > followed)) {
       joint = std::move(found.joint);

@@ -366,24 +366,22 @@ bool decays_decide(const Trial& trial) { return takes_small_steps(trial.arrival.
 
 bool fit_decays_first(Trial& trial, const Trial& base, bool from_here) {
   JointProblem& joint = trial.arrival.joint;
-  constexpr double worth_it = 0.5;
-  const double before = left_of_decays(base), followed = takes_small_steps(joint) ? 1.15 : 2;  // corners are seen where a fit with everything free loses its way
+  const double before = left_of_decays(base), followed = takes_small_steps(joint) ? explained : twice_the_noise;  // corners are seen where a fit with everything free loses its way
   if (!has_decays(joint) || before < followed) {
     measure(trial);
     return !has_decays(joint) || !takes_small_steps(joint);  // a gap would show
   }
   trial.decays = fit_decays(joint, trial.effects.back(), from_here);
-  const bool helps = trial.decays.chi2 - 1 < worth_it * (before - 1);
+  const bool helps = trial.decays.chi2 - 1 < half_of_it * (before - 1);
   measure(trial);
   if (helps) {
-    constexpr double astray = 10;
     in_noise_of_decays(trial, [&] {
       in_parallel(joint.runs().size(), [&](std::size_t r) {  // c of the others still is the baseline's
         RunResidual& run = joint.runs()[r];
-        if (run.takes_small_steps(joint.theta(r)) || trial.variance[r] > astray) find_motion(run, joint.theta(r));
+        if (run.takes_small_steps(joint.theta(r)) || trial.variance[r] > nearly_explained) find_motion(run, joint.theta(r));
       });
     });
-    if (!takes_small_steps(joint) && trial.decays.chi2 < nearly_explained) fit_own_parameters(joint, astray);
+    if (!takes_small_steps(joint) && trial.decays.chi2 < nearly_explained) fit_own_parameters(joint, nearly_explained);
   }
   temper(joint);
   measure(trial);

@@ -7,6 +7,7 @@
 #include "fit/search/arrival.h"
 #include "fit/search/decays_first.h"
 #include "fit/search/screening.h"
+#include "fit/search/search_numbers.h"
 
 namespace unrig {
 
@@ -29,11 +30,6 @@ struct Trial {
   double excess() const;
 };
 
-constexpr double decisive = 10;  ///< BIC: very strong evidence (Kass and Raftery, J. American Statistical Association 90 (1995) 773)
-constexpr double half_of_it = 0.5;  ///< of what the best promises or takes: what is less does not come out ahead among thousands of samples
-constexpr std::size_t most_effects = 3;  ///< of one set
-constexpr double explained = 1.15;  ///< residual power over noise power of a model that leaves nothing to name
-constexpr double nearly_explained = 10;  ///< residual power over noise power: beyond it no two laws explain a mismatch alike
 inline bool leaves_nothing(const Trial& trial) { return trial.reduced_chi2() < explained; }
 
 /// Sets what a trial leaves of each run, as it stands.

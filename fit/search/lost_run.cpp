@@ -13,8 +13,6 @@
 namespace unrig {
 namespace {
 
-constexpr double twice_the_noise = 2;
-
 /// Searches c of a run from afar at its theta: from where it stands, and from what is known of no trajectory.
 void follow_from_afar(Trial& trial, std::size_t lost) {
   JointProblem& joint = trial.arrival.joint;

@@ -7,11 +7,10 @@
 #include "fit/likelihood/explained.h"
 #include "fit/search/find_motion.h"
 #include "fit/search/left_of_runs.h"
+#include "fit/search/search_numbers.h"
 
 namespace unrig {
 namespace {
-
-constexpr double to_the_noise = 1.02;  // reduced chi-square: one per cent of it is chance in a few thousand samples
 
 /// Searches the own parameters of the one run of `alone` and its motion; then, as long as that helps, with the motion once more from afar.
 void search_alone(JointProblem& alone) {
@@ -51,14 +50,13 @@ bool back_at_the_rig(JointProblem& alone) {
 
 /// One run of a joint problem, its own parameters searched: from where they stand and, where that ends far from the noise and they had gone astray, from where the rig file has them.
 JointProblem fitted_alone(const JointProblem& joint, std::size_t r) {
-  constexpr double far = 10;
   JointProblem there = joint.part({r});
   for (Unknown& u : there.unknowns()) u.held = u.held || u.run < 0;
   there.runs().front().temper(1);
   JointProblem alone = there;
   search_alone(alone);
   const bool dear = there.runs().front().takes_small_steps(there.theta(0));  // a search under a gap goes from afar as it is
-  if (dear || alone.chi2() < far * static_cast<double>(alone.runs().front().degrees_of_freedom()) || !back_at_the_rig(there)) return alone;
+  if (dear || alone.chi2() < nearly_explained * static_cast<double>(alone.runs().front().degrees_of_freedom()) || !back_at_the_rig(there)) return alone;
   search_alone(there);
   return there.chi2() < alone.chi2() ? there : alone;
 }

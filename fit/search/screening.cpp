@@ -9,6 +9,7 @@
 #include "core/law/law_effect.h"
 #include "core/numerics/in_parallel.h"
 #include "core/propagate/feedback_force.h"
+#include "fit/search/search_numbers.h"
 
 namespace unrig {
 namespace {
@@ -44,8 +45,7 @@ JointProblem best_of(const std::vector<JointProblem>& starts, double without, bo
     solved[i].solve(options);
   });
   const auto [left, end] = least(solved);
-  constexpr double worth_it = 0.5;
-  return left < worth_it * without ? solved[end] : starts[start];
+  return left < half_of_it * without ? solved[end] : starts[start];
 }
 
 void set_values(JointProblem& joint, const std::string& id, const VectorXd& values) {
