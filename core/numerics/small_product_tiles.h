@@ -34,7 +34,7 @@ template <Result result>
   }
 }
 
-/// All rows of C columns, but for those that are no whole vector of W; returns how many were done.
+/// All rows of C columns, but for the last where their number is odd; returns how many were done.
 template <int W, int R, int C, Result result>
 [[gnu::always_inline]] inline std::ptrdiff_t stripe(const double* a, std::ptrdiff_t a_stride, std::ptrdiff_t rows, std::ptrdiff_t inner, const double* b, std::ptrdiff_t b_stride, double* c, std::ptrdiff_t c_stride) {
   std::ptrdiff_t row = 0;

@@ -122,6 +122,7 @@ MatrixXd motion_prior(const RunResidual& residual, const VectorXd& theta) {
   }
 
   const MatrixXd triangle = residual.linear_rows(theta);  // [R | q]
+  if (triangle.size() == 0) return {};
   const MatrixXd R = triangle.topLeftCorner(unknowns, unknowns);
   const MatrixXd information = R.transpose() * R;
   const VectorXd right = R.transpose() * triangle.col(unknowns).head(unknowns);

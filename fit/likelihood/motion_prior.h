@@ -14,7 +14,7 @@ namespace unrig {
 /// the data determine, times a prior of their own: ln tau_g^2 of neighbouring groups, five knots apart (up to twenty where the shaft moves for long), differ by N(0, 1) times the
 /// knots' distance in samples, so that what five differences happen to be does not stand for how rough the motion is. Each group is then as wide as the wider of its neighbours.
 ///
-/// Returns the rows d_j / tau_g over the run's linear unknowns (RunResidual::set_motion_prior), at theta. Empty without motion.
+/// Returns the rows d_j / tau_g over the run's linear unknowns (RunResidual::set_motion_prior), at theta. Empty without motion, and where the model runs away at theta.
 Eigen::MatrixXd motion_prior(const RunResidual& residual, const Eigen::VectorXd& theta);
 
 }  // namespace unrig

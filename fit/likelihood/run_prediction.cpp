@@ -140,6 +140,7 @@ MatrixXd RunResidual::linear_rows(const VectorXd& theta) const {
   RunResidual free = *this;
   free.set_motion_prior({});
   const Solution solution = free.solve(theta);
+  if (!std::isfinite(solution.chi2)) return {};
   MatrixXd rows(unknowns_, unknowns_ + 1);
   const MatrixXd factor = solution.model->eliminate->factor();
   rows << factor, factor * solution.linear;

@@ -131,7 +131,7 @@ class RunResidual {
   };
   Sensitivity sensitivity(const Eigen::VectorXd& theta) const;
 
-  /// The linear unknowns' least-squares problem at theta, triangularised: [R | q], R c = q, without any prior on the motion.
+  /// The linear unknowns' least-squares problem at theta, triangularised: [R | q], R c = q, without any prior on the motion. Empty where the model runs away.
   Eigen::MatrixXd linear_rows(const Eigen::VectorXd& theta) const;
   /// Rows over c that are held against zero beside the data (motion_prior); they count in chi-square. Empty: none.
   void set_motion_prior(const Eigen::MatrixXd& rows);

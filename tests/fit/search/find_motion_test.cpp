@@ -2,11 +2,13 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <string>
 #include <vector>
 
 #include "fit/fit.h"
 #include "fit/search/own_parameters.h"
+#include "tests/support/sample_data.h"
 #include "tests/support/shared_data.h"
 
 namespace unrig {
@@ -58,6 +60,20 @@ TEST(FindMotion, ASlopeThatWentAstrayIsFoundAgain) {
   EXPECT_EQ(explained.chi2(), joint.chi2()) << "it is not left with so much";
   fit_own_parameters(joint, 10);
   EXPECT_LT(joint.chi2(), (1 + by_chance) * freedom);
+}
+
+/// As a law may in a run that was not fitted: there is no trajectory to be found, and that is no fault.
+TEST(FindMotion, LeavesARunAsItIsFromWhichTheModelRunsAway) {
+  const Rig rig = read_rig(test::null_campaign("rig.toml"));
+  const AeroelasticModel model = AeroelasticModel(rig, make_basis(rig, Eigen::Index{2}, Eigen::Index{1}), wagner(Wagner::jones)).with_effects({"cubic-stiffness"});
+  Eigen::VectorXd theta = model.start_values();
+  theta[model.index("cubic-stiffness.coefficient")] = std::nan("");
+  const unrig::Run step = read_run(test::null_campaign("step_a.csv"));
+  RunResidual run(model, step, motion_windows(step));
+  ASSERT_TRUE(std::isinf(run.solve(theta).chi2));
+  EXPECT_TRUE(find_motion(run, theta));
+  EXPECT_TRUE(std::isinf(run.solve(theta).chi2));
+  EXPECT_EQ(run.tempered(), 1);
 }
 
 TEST(FindMotion, OfALinearModelThereIsNothingToFind) {
