@@ -30,6 +30,10 @@ bool is_undetermined(const FitProblem& problem, const Trial& set) {
   });
 }
 
+bool is_listed(const Trial& t) { return !is_law_id(t.effects.back()); }
+
+bool is_no_curve(const Trial& t) { return is_listed(t) || !law_of(effect(t.arrival.joint.model().rig(), t.effects.back())).is_curve(); }
+
 }  // namespace
 
 bool none_leaves_nothing(const std::vector<Trial>& tried) { return std::all_of(tried.begin(), tried.end(), leaves_something); }
@@ -67,8 +71,9 @@ std::optional<Laws> choose_law(const DiagnoseProblem& problem, FitProblem& fit_p
   if (laws.tried.empty()) return std::nullopt;
   const auto rest = std::stable_partition(laws.tried.begin(), laws.tried.end(), [](const Trial& t) { return !leaves_something(t); });
   const auto last = rest == laws.tried.begin() ? laws.tried.end() : rest;
-  const auto listed = std::find_if(laws.tried.begin(), last, [](const Trial& t) { return !is_law_id(t.effects.back()); });
-  if (listed != last && bic_difference(*listed, laws.tried.front()) < decisive) std::rotate(laws.tried.begin(), listed, listed + 1);
+  // Of what no evidence decides between a formula goes before a curve, and an effect of the list before both.
+  for (const auto& goes_first : {is_no_curve, is_listed})
+    if (const auto first = std::find_if(laws.tried.begin(), last, goes_first); first != last && bic_difference(*first, laws.tried.front()) < decisive) std::rotate(laws.tried.begin(), first, first + 1);
   fit_problem.rig.laws = laws.tried.front().arrival.joint.model().rig().laws;
   FoundSet with = look_at(problem, files, baseline, files, laws.tried.front(), 0);
   const bool holds = with.clean() || bic_difference(with.best, baseline) < selection.ranking().front().delta_bic + decisive;

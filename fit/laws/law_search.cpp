@@ -14,6 +14,7 @@
 #include "core/law/law_effect.h"
 #include "core/numerics/in_parallel.h"
 #include "core/numerics/time_limit.h"
+#include "fit/laws/curve_of_state.h"
 #include "fit/laws/screen.h"
 #include "fit/search/decays_first.h"
 #include "fit/search/left_of_runs.h"
@@ -36,9 +37,10 @@ void sort_by(std::vector<T>& all, Key key) {
   all = std::move(sorted);
 }
 
-/// Whether the model does not stay finite in one of the runs: those that were not followed behind the decays.
+/// Whether the model does not stay finite in one of the runs, those that were not followed behind the decays, or its slopes do not.
 bool runs_away(const Trial& trial) {
-  return std::any_of(trial.variance.begin(), trial.variance.end(), [](double variance) { return !(variance < run_away); });
+  const bool far_off = std::any_of(trial.variance.begin(), trial.variance.end(), [](double variance) { return !(variance < run_away); });
+  return far_off || !trial.arrival.joint.linearise().jacobian.allFinite();
 }
 
 bool is_among(const std::vector<std::string>& ids, const std::string& id) { return std::find(ids.begin(), ids.end(), id) != ids.end(); }
@@ -53,6 +55,8 @@ Eigen::VectorXd values_of(const JointProblem& joint, const Form& form, const std
 
 /// Whether there is a mismatch in the decays, of which the states that they ask for can tell.
 bool shows_in_decays(const Trial& base) { return has_decays(base.arrival.joint) && left_of_decays(base) > explained; }
+
+double samples_of(const Trial& trial) { return std::accumulate(trial.samples.begin(), trial.samples.end(), 0.0); }
 
 /// Where the search for the parameters of a form begins: at the coefficient, and where it is seen decisively at the shape, that the free decays ask for; otherwise at the shape at which it stands.
 Eigen::VectorXd start_of(Form form, const BesideUnknownForces& beside) {
@@ -123,9 +127,8 @@ std::vector<std::string> LawSearch::forms_worth_a_fit(const Trial& base, const P
   return worth_it;
 }
 
-/// What the decays ask for, most evidence first: laws of the list and formulas of the dictionary, each where the regression on the states has it. A formula's evidence is told with BIC for its parameters.
-std::vector<LawSearch::AskedFor> LawSearch::asked_by_decays() const {
-  const BesideUnknownForces beside = beside_unknown_forces(base_.arrival.joint);
+/// What the decays ask for along these states: laws of the list and formulas of the dictionary, each where the regression has it. A formula's evidence is told with BIC for its parameters.
+std::vector<LawSearch::AskedFor> LawSearch::asked_along(const BesideUnknownForces& beside) const {
   const Reach reach = reach_of(beside);
   const std::vector<std::string> of_list = of_the_list(base_);
   std::vector<Form> forms = laws_of_the_list(problem_.rig, reach);
@@ -134,20 +137,34 @@ std::vector<LawSearch::AskedFor> LawSearch::asked_by_decays() const {
     if (form.listed.empty()) forms.push_back(std::move(form));
   for (Form& form : forms) form.starts = shapes_of(form, Grid::fine);
   const std::vector<Screened> screened = screen(forms, beside);
-  double samples = 0, without = INFINITY;
-  for (const double n : base_.samples) samples += n;
+  double without = INFINITY;
   for (const Screened& s : screened) without = std::min(without, s.deviance + s.gain);
   std::vector<AskedFor> asked;
   for (std::size_t i = 0; i < forms.size(); ++i) {
     if (!(screened[i].gain > decisive)) continue;
     forms[i].starts = {screened[i].start};
-    const double evidence = without - screened[i].deviance - std::log(samples) * static_cast<double>(forms[i].law.parameters.size());
+    const double evidence = without - screened[i].deviance - std::log(samples_of(base_)) * static_cast<double>(forms[i].law.parameters.size());
     asked.push_back({std::move(forms[i]), evidence});
   }
+  return asked;
+}
+
+/// The most evident, and those with half of its evidence, in this order.
+void LawSearch::keep_most_evident(std::vector<AskedFor>& asked) const {
   sort_by(asked, [](const AskedFor& a) { return -a.evidence; });
   if (!asked.empty()) std::erase_if(asked, [most = asked.front().evidence](const AskedFor& a) { return !(a.evidence > decisive) || a.evidence < half_of_it * most; });
   if (asked.size() > most_refits) asked.resize(most_refits);
-  return asked;
+}
+
+/// The same along the states that the decays ask for with a curve at work, and the curve itself. False where there is none, or its first terms have less than half of the evidence of the best formula.
+bool LawSearch::ask_for_a_curve(std::vector<AskedFor>& asked) const {
+  const double least = asked.empty() ? decisive : std::max(decisive, half_of_it * asked.front().evidence);
+  std::optional<CurveOfState> curve = curve_of_state(problem_, base_, beside_unknown_forces(base_.arrival.joint), least);
+  if (!curve) return false;
+  asked = asked_along(curve->beside);
+  asked.push_back({std::move(curve->form), curve->evidence});
+  keep_most_evident(asked);
+  return true;
 }
 
 /// The base with these laws of the list where the decays have them.
@@ -165,13 +182,14 @@ Trial LawSearch::begun_with(const std::vector<AskedFor>& asked) const {
   return trial;
 }
 
-/// Effects of the list that may be at work beside `base`.
+/// Effects of the list that may be at work beside `base`; among forms those that the dictionary has.
 std::vector<std::string> LawSearch::of_the_list(const Trial& base) const {
   std::vector<Conditions> conditions;
   for (const RunResidual& run : base.arrival.joint.runs()) conditions.push_back(run.conditions());
   std::vector<std::string> ids;
   for (const Effect& e : effects())
     if (!is_among(base.effects, e.id) && why_idle(e, problem_.rig, conditions).empty()) ids.push_back(e.id);
+  if (among_ == Among::forms) std::erase_if(ids, [forms = listed_forms()](const std::string& id) { return !is_among(forms, id); });
   return ids;
 }
 
@@ -214,9 +232,8 @@ LawSearch::Prospects LawSearch::rivals(const Promised& promised, const std::vect
   return forms;
 }
 
-/// The same of those that the decays ask for: where a law of the list leaves nothing only formulas with more evidence, and none where a signal promises more than any law to first order.
-LawSearch::Prospects LawSearch::rivals(const std::vector<AskedFor>& asked, const Promised& promised, const std::vector<Trial>& tried) {
-  asked_forms_ = true;
+/// The same of those that the decays ask for: where a law of the list leaves nothing only formulas with more evidence, and none where a signal promises more than any law to first order, unless a curve is among them.
+LawSearch::Prospects LawSearch::rivals(const std::vector<AskedFor>& asked, bool with_curve, const Promised& promised, const std::vector<Trial>& tried) {
   const auto explains = std::find_if(tried.begin(), tried.end(), [&](const Trial& t) { return !leaves_something_(t); });  // noise of a colour takes up what another law leaves
   std::vector<std::string> ids;
   for (const AskedFor& a : asked) {
@@ -228,7 +245,8 @@ LawSearch::Prospects LawSearch::rivals(const std::vector<AskedFor>& asked, const
     problem_.rig.laws.push_back(as_effect(a.form));
     ids.push_back(a.form.law.id());
   }
-  return prospects(base_, screened_beside(base_, ids), promised, 0);
+  std::vector<Trial> screened = screened_beside(base_, ids);
+  return with_curve ? Prospects{std::move(screened), promised} : prospects(base_, std::move(screened), promised, 0);
 }
 
 /// By the free decays; runs that are driven from first guesses, in full.
@@ -346,11 +364,6 @@ void LawSearch::search_in_order(std::vector<Trial>& all) {
     sort_by(all, [&](const Trial& t) { return bic_difference(t, base_); });
     settle_first(all);
   };
-  const auto listed = [&](const Trial& base) {
-    std::vector<std::string> ids = of_the_list(base);
-    if (among_ == Among::forms) std::erase_if(ids, [forms = listed_forms()](const std::string& id) { return !is_among(forms, id); });
-    return ids;
-  };
   const auto any_explains = [&] { return std::any_of(all.begin(), all.end(), [&](const Trial& t) { return is_explained(t); }); };
   tell(base_);
   Promised promised;
@@ -361,7 +374,8 @@ void LawSearch::search_in_order(std::vector<Trial>& all) {
     if (of_list.size() > 1 && !any_explains()) try_all({begun_with({of_list[0], of_list[1]})}, base_);
   };
   if (by_decays) {
-    asked = asked_by_decays();
+    asked = asked_along(beside_unknown_forces(base_.arrival.joint));
+    keep_most_evident(asked);
     std::copy_if(asked.begin(), asked.end(), std::back_inserter(of_list), [](const AskedFor& a) { return !a.form.listed.empty(); });
     std::vector<Trial> alone;
     for (const AskedFor& a : of_list) {
@@ -373,7 +387,7 @@ void LawSearch::search_in_order(std::vector<Trial>& all) {
   }
   const bool found = any_explains();
   if (among_ == Among::laws_and_forms && !found) {
-    std::vector<std::string> ids = listed(base_);
+    std::vector<std::string> ids = of_the_list(base_);
     std::erase_if(ids, [&](const std::string& id) { return std::any_of(asked.begin(), asked.end(), [&](const AskedFor& a) { return a.form.listed == id; }); });
     screened_ = screened_beside(base_, ids);
     Prospects laws = prospects(base_, screened_, {});
@@ -386,17 +400,26 @@ void LawSearch::search_in_order(std::vector<Trial>& all) {
     }
   }
   if (!found && signals_leave_nothing(promised)) return;
-  if (by_decays) {
-    try_all(rivals(asked, promised, all).laws, base_);
-  } else {
-    asked_forms_ = true;
-    try_all(rivals(promised, all).laws, base_);
+  // What has a name by now, whatever remains beside it, is no curve.
+  const bool is_named = any_explains() || (!all.empty() && all.front().excess() < (1 - enough_to_name) * base_.excess());
+  bool has_curve = false;
+  if (shows_in_decays(base_) && !is_named) {
+    if (!by_decays) keep_most_evident(asked = asked_along(beside_unknown_forces(base_.arrival.joint)));
+    has_curve = ask_for_a_curve(asked);
   }
+  if (has_curve) {
+    std::vector<Trial> listed;
+    for (const AskedFor& a : asked)
+      if (!a.form.listed.empty()) listed.push_back(begun_with({a}));
+    try_all(std::move(listed), base_, false);
+  }
+  asked_forms_ = true;
+  try_all((by_decays || has_curve ? rivals(asked, has_curve, promised, all) : rivals(promised, all)).laws, base_);
   if (goes_on(all)) {
     Trial first = all.front();
     tell(first);
     if (!first.is_settled && !decays_decide(first) && !all_driven(first.arrival.joint)) settle(first);  // its motions may not have been followed, along which the second is to be seen
-    Prospects second = prospects(first, screened_beside(first, listed(first)), {});
+    Prospects second = prospects(first, screened_beside(first, of_the_list(first)), {});
     promised = second.promised;
     in_order_of_parameters(second.laws);
     try_all(std::move(second.laws), first);

@@ -23,6 +23,9 @@ namespace unrig {
 /// Before anything else was tried (Among::laws_and_forms) laws are looked for where one of them promises most of all effects, signals included, to first order, and only what promises half as much: laws of the list, then
 /// forms, which are their rivals; no forms where a signal promises to leave nothing.
 ///
+/// Where no law of the list takes all but a few per cent of it, and the decays show it, a curve of the state is looked for (curve_of_state.h), formulas and laws of the list are asked for anew along the states that go with it,
+/// and all these are followed.
+///
 /// Where more than ten times the noise is left a step to first order says little. If the decays show the mismatch, laws and forms are then asked for by evidence: their forces along the states that the decays ask for, regressed on the
 /// innovations of a filter for which the force is unknown (screen). Laws of the list come first, each from where the regression has it, then the two with most evidence together.
 ///
@@ -59,10 +62,12 @@ class LawSearch {
     Form form;
     double evidence = 0;  ///< twice the log likelihood beyond that without a law, less BIC's for its parameters
   };
-  std::vector<AskedFor> asked_by_decays() const;
+  std::vector<AskedFor> asked_along(const BesideUnknownForces& beside) const;
+  void keep_most_evident(std::vector<AskedFor>& asked) const;
+  bool ask_for_a_curve(std::vector<AskedFor>& asked) const;
   Trial begun_with(const std::vector<AskedFor>& asked) const;
   void in_order_of_parameters(std::vector<Trial>& tried) const;
-  Prospects rivals(const std::vector<AskedFor>& asked, const Promised& promised, const std::vector<Trial>& tried);
+  Prospects rivals(const std::vector<AskedFor>& asked, bool with_curve, const Promised& promised, const std::vector<Trial>& tried);
   std::vector<Trial> screened_beside(const Trial& base, const std::vector<std::string>& ids) const;
   Prospects prospects(const Trial& base, std::vector<Trial> screened, const Promised& known, double least = half_of_it) const;
   Prospects rivals(const Promised& promised, const std::vector<Trial>& tried);

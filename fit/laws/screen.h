@@ -14,13 +14,8 @@ struct Screened {
   double gain = 0;        ///< twice the log likelihood beyond that without a law; 0 where the form was not looked at, or its coefficient lies where it may not be
 };
 
-/// The force of every form, evaluated on the states that the readings ask for (the smoother of an unknown force, fit/force/missing_force.h), is sent through the linear rig onto the readings, and its coefficient is the
-/// regression of the innovations
-///
-///   e_k(readings) = sum over shifts a e_k(force of shift) + sum over initial states + c e_k(force of the form)
-///
-/// of the Kalman filter of that unknown force, whose density q is then smaller by as much as the likelihood asks for: linear in the record and in all that is looked for. Torsion and normal mode each through their own port.
-/// Forms that act on lift are not looked at. Laws at work in `beside` are left out of the rig. One per form, in their order.
+/// Every form at each of its shapes, its coefficients as the regression on the decays has them (law_regression.h); normal mode and torsion each through their own port. Forms that act on lift are not looked at.
+/// One per form, in their order.
 std::vector<Screened> screen(const std::vector<Form>& forms, const BesideUnknownForces& beside);
 
 }  // namespace unrig

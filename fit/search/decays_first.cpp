@@ -377,13 +377,13 @@ bool all_driven(const JointProblem& joint) {
 
 bool has_decays(const JointProblem& joint) { return std::any_of(joint.runs().begin(), joint.runs().end(), is_decay); }
 
-BesideUnknownForces beside_unknown_forces(const JointProblem& joint) {
+BesideUnknownForces beside_unknown_forces(const JointProblem& joint, int levels) {
   JointProblem start = joint;
   back_to_the_rig(start, 2);
   for (RunResidual& run : start.runs())
     if (is_decay(run)) run.temper(1);
   GrowingTrust trust(std::move(start));
-  trust.fit(1);
+  trust.fit(levels);
   return {trust.joint(), trust.states()};
 }
 

@@ -38,8 +38,8 @@ struct BesideUnknownForces {
   JointProblem joint;                   ///< parameters at which the decays ask for the least of them
   std::vector<Eigen::MatrixXd> states;  ///< per run: those of the model that the readings ask for, n x samples; empty of runs whose motion is estimated
 };
-/// From the parameters of `joint` or, where they have gone astray, from the rig's first values.
-BesideUnknownForces beside_unknown_forces(const JointProblem& joint);
+/// From the parameters of `joint` or, where they have gone astray, from the rig's first values. `levels`: of trust in laws at work, each three times the one before.
+BesideUnknownForces beside_unknown_forces(const JointProblem& joint, int levels = 1);
 
 /// What laws that are trusted to within 2.5 % of the force that is missed leave of the decays: J over the samples, at the joint problem's theta.
 double left_as_trusted(const JointProblem& joint);

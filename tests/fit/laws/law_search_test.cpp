@@ -6,7 +6,6 @@
 
 #include <cmath>
 #include <functional>
-#include <numbers>
 #include <string>
 
 #include "core/law/law_effect.h"
@@ -17,6 +16,7 @@
 #include "fit/diagnose/selection.h"
 #include "fit/laws/found_law.h"
 #include "fit/laws/screen.h"
+#include "tests/fit/laws/two_decays.h"
 #include "tests/fit/one_mode.h"
 #include "tests/support/sample_data.h"
 
@@ -25,40 +25,9 @@ namespace {
 
 using Eigen::Index;
 using Eigen::VectorXd;
-using std::numbers::pi;
 
-constexpr double noise = 0.002;  // N; the rig's gauge reads its displacement, 1 N per metre, so that decays of 1 begin at 500 times it
-constexpr double omega = 2 * pi * one_mode::hertz, stiffness = omega * omega;
-
-/// x'' + 2 zeta omega x' + omega^2 x = force(x, v) from `start`, by the classical Runge-Kutta method in eight steps a sample.
-VectorXd decay(const std::function<double(double, double)>& force, double start, Index samples) {
-  constexpr int finer = 8;
-  const double h = one_mode::dt / finer;
-  using State = Eigen::Vector2d;
-  const auto slope = [&](const State& s) {
-    return State(s[1], force(s[0], s[1]) - 2 * one_mode::damping_ratio * omega * s[1] - stiffness * s[0]);
-  };
-  State s(start, 0);
-  VectorXd x(samples);
-  for (Index k = 0; k < samples; ++k) {
-    x[k] = s[0];
-    for (int i = 0; i < finer; ++i) {
-      const State a = slope(s), b = slope(s + h / 2 * a), c = slope(s + h / 2 * b), d = slope(s + h * c);
-      s += h / 6 * (a + 2 * b + 2 * c + d);
-    }
-  }
-  return x;
-}
-
-/// Two decays, from 1 and from 0.4, one of them to the other side.
-FitProblem two_decays(const std::function<double(double, double)>& force) {
-  constexpr Index samples = 900;
-  FitProblem problem;
-  problem.rig = one_mode::rig();
-  problem.runs.push_back(one_mode::decay("large.csv", decay(force, 1, samples) + noise * one_mode::white_noise(samples, 3)));
-  problem.runs.push_back(one_mode::decay("small.csv", decay(force, -0.4, samples) + noise * one_mode::white_noise(samples, 4)));
-  return problem;
-}
+using two_decays::omega;
+using two_decays::stiffness;
 
 struct Hidden {
   const char* law;  // of the dictionary
@@ -91,7 +60,7 @@ class LawSearches : public testing::TestWithParam<std::size_t> {};
 
 TEST_P(LawSearches, FindTheFormAndItsParameters) {
   const Hidden& truth = hidden[GetParam()];
-  FitProblem problem = two_decays(truth.force);
+  FitProblem problem = two_decays::problem(truth.force);
   const Trial base = fit_baseline(problem);
   ASSERT_GT(base.reduced_chi2(), 10) << "a linear rig does not explain it";
   const auto leaves_something = [](const Trial& t) { return what_remains(t).found; };
@@ -133,7 +102,7 @@ INSTANTIATE_TEST_SUITE_P(Of, LawSearches, testing::Range<std::size_t>(0, hidden.
 });
 
 TEST(LawSearch, FindsNothingInANonlinearDecayThatIsNone) {
-  FitProblem problem = two_decays([](double, double) { return 0.0; });
+  FitProblem problem = two_decays::problem([](double, double) { return 0.0; });
   DiagnoseProblem diagnosis;
   diagnosis.rig = problem.rig;
   diagnosis.runs = problem.runs;
@@ -145,7 +114,7 @@ TEST(LawSearch, FindsNothingInANonlinearDecayThatIsNone) {
 /// Little above the noise the free decays are not fitted by themselves, and what a step to first order promises at the rig's own stiffness leaves more than no law does: it is followed all the same.
 TEST(LawSearch, FollowsWhatAStepDoesNotComeNear) {
   constexpr double gap = 1.3, pull = 4e-4 * stiffness;
-  FitProblem problem = two_decays([](double x, double) { return pull * (std::pow(1 - x / gap, -2) - std::pow(1 + x / gap, -2)); });
+  FitProblem problem = two_decays::problem([](double x, double) { return pull * (std::pow(1 - x / gap, -2) - std::pow(1 + x / gap, -2)); });
   const Trial base = fit_baseline(problem);
   EXPECT_GT(base.reduced_chi2(), 1.5);
   EXPECT_LT(base.reduced_chi2(), 2);
@@ -184,7 +153,7 @@ TEST(Dictionary, AsksForCornersThroughoutTheReach) {
 
 /// A rig gets other laws while they are tried; the one beside which a second is looked for stays at work.
 TEST(LawSearch, FindsTheLawAtWorkInTheFitAndNotInTheRig) {
-  FitProblem problem = two_decays(hidden.front().force);
+  FitProblem problem = two_decays::problem(hidden.front().force);
   const Trial base = fit_baseline(problem);
   const auto leaves_something = [](const Trial& t) { return what_remains(t).found; };
   const Trial with = LawSearch(problem, base, leaves_something, never, LawSearch::Among::forms).search().front();
@@ -194,7 +163,7 @@ TEST(LawSearch, FindsTheLawAtWorkInTheFitAndNotInTheRig) {
 
 TEST(Screen, PutsTheTruthFirstOrSecond) {
   for (const Hidden& truth : hidden) {
-    FitProblem problem = two_decays(truth.force);
+    FitProblem problem = two_decays::problem(truth.force);
     const Trial base = fit_baseline(problem);
     const BesideUnknownForces beside = beside_unknown_forces(base.arrival.joint);
     const Reach reach = reach_of(beside);
@@ -228,7 +197,7 @@ TEST(Screen, TellsWhereAnEffectOfTheListBegins) {
       {"coulomb-friction", [&](double, double v) { return -force * std::tanh(v / speed); }, {force}},
   };
   for (const Listed& truth : list) {
-    const FitProblem problem = two_decays(truth.force);
+    const FitProblem problem = two_decays::problem(truth.force);
     const Trial base = fit_baseline(problem);
     const BesideUnknownForces beside = beside_unknown_forces(base.arrival.joint);
     std::vector<Form> forms = laws_of_the_list(problem.rig, reach_of(beside));
@@ -284,7 +253,7 @@ TEST(Dictionary, HasTheForcesOfTheListsEffects) {
 /// What has been followed by the time a limit is reached stands.
 TEST(LawSearch, AStoppedSearchKeepsWhatItHas) {
   const double spring = 0.08 * stiffness;
-  FitProblem problem = two_decays([&](double x, double) { return -spring * x * x * x; });
+  FitProblem problem = two_decays::problem([&](double x, double) { return -spring * x * x * x; });
   const Trial base = fit_baseline(problem);
   const auto leaves_something = [](const Trial& t) { return what_remains(t).found; };
   const auto search = [&](std::uint64_t most) {
