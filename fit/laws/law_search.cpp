@@ -91,14 +91,18 @@ std::vector<double> LawSearch::screen_forms(const Trial& base, const Screening& 
   return promise;
 }
 
+/// The rig has the laws at work in `base` from then on, and no others.
+void LawSearch::keep_laws_of(const Trial& base) {
+  problem_.rig.laws = base.arrival.joint.model().rig().laws;  // the rig may have got others since
+  std::erase_if(problem_.rig.laws, [&](const auto& law) { return !is_among(base.effects, law->id); });
+}
+
 /// Ids of the forms that promise most to first order, which the rig gets. `known`: what is promised without them.
 std::vector<std::string> LawSearch::forms_worth_a_fit(const Trial& base, const Promised& known) {
   const BesideUnknownForces beside = beside_unknown_forces(base.arrival.joint);
   std::vector<Form> forms = dictionary(problem_.rig, reach_of(beside));
   std::erase_if(forms, [](const Form& form) { return !form.listed.empty(); });
-  std::vector<std::shared_ptr<const Effect>> at_work = base.arrival.joint.model().rig().laws;  // the rig may have got others since
-  std::erase_if(at_work, [&](const auto& law) { return !is_among(base.effects, law->id); });
-  problem_.rig.laws = at_work;
+  keep_laws_of(base);
   const Screening screening(problem_, base.arrival);
   std::vector<std::size_t> all(forms.size());
   std::iota(all.begin(), all.end(), std::size_t{0});
@@ -116,7 +120,7 @@ std::vector<std::string> LawSearch::forms_worth_a_fit(const Trial& base, const P
   if (order.size() > most_refits) order.resize(most_refits);
   std::erase_if(order, [&](std::size_t i) { return promise[i] < half_of_it * promise[order.front()]; });
 
-  problem_.rig.laws = at_work;
+  keep_laws_of(base);
   std::vector<std::string> worth_it;
   for (const std::size_t i : order) {
     Form form = forms[i];
@@ -236,7 +240,9 @@ LawSearch::Prospects LawSearch::rivals(const Promised& promised, const std::vect
 LawSearch::Prospects LawSearch::rivals(const std::vector<AskedFor>& asked, bool with_curve, const Promised& promised, const std::vector<Trial>& tried) {
   const auto explains = std::find_if(tried.begin(), tried.end(), [&](const Trial& t) { return !leaves_something_(t); });  // noise of a colour takes up what another law leaves
   std::vector<std::string> ids;
+  keep_laws_of(base_);
   for (const AskedFor& a : asked) {
+    if (is_among(base_.effects, a.form.law.id())) continue;
     if (!a.form.listed.empty()) {
       if (explains != tried.end()) break;  // only forms with more evidence than any law of the list
       continue;
@@ -408,6 +414,7 @@ void LawSearch::search_in_order(std::vector<Trial>& all) {
     has_curve = ask_for_a_curve(asked);
   }
   if (has_curve) {
+    keep_laws_of(base_);
     std::vector<Trial> listed;
     for (const AskedFor& a : asked)
       if (!a.form.listed.empty()) listed.push_back(begun_with({a}));

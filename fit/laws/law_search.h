@@ -65,6 +65,7 @@ class LawSearch {
   std::vector<AskedFor> asked_along(const BesideUnknownForces& beside) const;
   void keep_most_evident(std::vector<AskedFor>& asked) const;
   bool ask_for_a_curve(std::vector<AskedFor>& asked) const;
+  void keep_laws_of(const Trial& base);
   Trial begun_with(const std::vector<AskedFor>& asked) const;
   void in_order_of_parameters(std::vector<Trial>& tried) const;
   Prospects rivals(const std::vector<AskedFor>& asked, bool with_curve, const Promised& promised, const std::vector<Trial>& tried);
