@@ -8,10 +8,8 @@
 #include <utility>
 #include <vector>
 
-#include <Eigen/Cholesky>
 #include <fmt/format.h>
 
-#include "core/law/law_effect.h"
 #include "fit/laws/law_regression.h"
 #include "fit/search/screening.h"
 #include "fit/search/search_numbers.h"
@@ -23,10 +21,9 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
+constexpr const char* name = "curve of the state";
 constexpr double little_force = 0.01;   // of the unknown force that the decays ask for without a law: what needs more beside it is not what is missing
 constexpr std::size_t most_terms = 12;  // a law has at most 16 parameters, a formula 200 parts
-
-double to_three_digits(double value) { return std::stod(fmt::format("{:.3g}", value)); }
 
 /// Terms to choose from, over x and v in units of what the runs reach; none that a linear rig has.
 std::vector<std::string> all_terms() {
@@ -124,12 +121,12 @@ Sum choose(const LawRegression::Level& level, double price) {
 
 Form form_of(const Sum& sum, const std::vector<std::string>& terms, const Reach& reach) {
   Law law;
-  law.name = "curve of the state";
+  law.name = name;
   law.scales.fill(1);
   for (std::size_t k = 0; k < sum.terms.size(); ++k) {
-    const std::string name = fmt::format("c{}", k + 1), &term = terms[static_cast<std::size_t>(sum.terms[k])];
-    law.force_text += fmt::format("{}{} * {}", k == 0 ? "-" : " - ", name, term);
-    law.parameters.push_back({name, "N", sum.coefficient[static_cast<Index>(k)], -1e30, 1e30, false, ""});
+    const std::string coefficient = fmt::format("c{}", k + 1), &term = terms[static_cast<std::size_t>(sum.terms[k])];
+    law.force_text += fmt::format("{}{} * {}", k == 0 ? "-" : " - ", coefficient, term);
+    law.parameters.push_back({coefficient, "N", sum.coefficient[static_cast<Index>(k)], -1e30, 1e30, false, ""});
     const Expression expression(term, {});
     for (const auto& [symbol, most] : {std::pair{Symbol::x, reach.x}, {Symbol::v, reach.v}})
       if (expression.uses(symbol)) law.scales[static_cast<std::size_t>(symbol)] = most;
@@ -147,7 +144,7 @@ BesideUnknownForces along(const FitProblem& problem, const Trial& base, const Fo
   FitProblem with = problem;
   const std::string id = form.law.id();
   with.rig.laws = base.arrival.joint.model().rig().laws;
-  std::erase_if(with.rig.laws, [&](const auto& law) { return law->id == id || std::find(base.effects.begin(), base.effects.end(), law->id) == base.effects.end(); });
+  std::erase_if(with.rig.laws, [&](const auto& law) { return std::find(base.effects.begin(), base.effects.end(), law->id) == base.effects.end(); });
   with.rig.laws.push_back(as_effect(form));
   std::vector<std::string> set = base.effects;
   set.push_back(id);
@@ -168,8 +165,9 @@ BesideUnknownForces along(const FitProblem& problem, const Trial& base, const Fo
 
 std::optional<CurveOfState> curve_of_state(const FitProblem& problem, const Trial& base, const BesideUnknownForces& beside, double least) {
   Reach reach = reach_of(beside);
-  if (!(reach.x > 0 && reach.v > 0 && reach.force > 0)) return std::nullopt;
-  reach.x = to_three_digits(reach.x), reach.v = to_three_digits(reach.v);
+  const bool is_at_work = std::find(base.effects.begin(), base.effects.end(), std::string("law:") + name) != base.effects.end();
+  if (is_at_work || !(reach.x > 0 && reach.v > 0 && reach.force > 0)) return std::nullopt;
+  reach.x = rounded(reach.x), reach.v = rounded(reach.v);
   const std::vector<std::string> terms = all_terms();
   const std::vector<Expression> expressions = expressions_of(terms, reach);
   std::optional<CurveOfState> best;

@@ -19,7 +19,7 @@ struct CurveOfState {
 /// 2 ln(terms to choose from). With the sum at work the decays ask for other states, and along these for other terms: four times, or until the terms are the same. The sum with the most evidence is told.
 ///
 /// `beside`: what the decays ask for without it. Empty where the first sum has not the evidence `least`, where the
-/// last one explains the decays along the states that go with the one before, with a hundredth of the unknown force beside it, worse than such a force does alone, and of a rig that the decays do not move.
+/// last one explains the decays along the states that go with the one before, with a hundredth of the unknown force beside it, worse than such a force does alone, of a rig that the decays do not move, and where `base` has one.
 /// Source: J. H. Friedman, Annals of Statistics 19 (1991) 1 (products of truncated powers, forward and backward); J. Chen and Z. Chen, Biometrika 95 (2008) 759 (with gamma = 1).
 std::optional<CurveOfState> curve_of_state(const FitProblem& problem, const Trial& base, const BesideUnknownForces& beside, double least);
 

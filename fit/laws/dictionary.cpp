@@ -125,9 +125,6 @@ double scale_of(Symbol symbol, const Reach& r) {
   }
 }
 
-/// To three digits: what a user reads need not have more, and it is a start.
-double rounded(double value) { return value == 0 || !std::isfinite(value) ? value : std::stod(fmt::format("{:.3g}", value)); }
-
 /// Whether the runs move what the law looks at.
 bool moved(const Line& line, const Reach& r) {
   if (line.acts_on == ActsOn::torsion) return r.twist > 0 && r.moment > 0;
@@ -174,6 +171,8 @@ Form put(const Line& line, const Reach& r) {
 }
 
 }  // namespace
+
+double rounded(double value) { return value == 0 || !std::isfinite(value) ? value : std::stod(fmt::format("{:.3g}", value)); }
 
 Reach reach_of(const BesideUnknownForces& beside) {
   const JointProblem& joint = beside.joint;

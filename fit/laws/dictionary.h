@@ -48,6 +48,9 @@ std::vector<Eigen::Index> coefficients_of(const Law& law);
 enum class Grid { first, coarse, fine };
 std::vector<Eigen::VectorXd> shapes_of(const Form& form, Grid grid);
 
+/// To three digits: what a user reads need not have more, and it is a start.
+double rounded(double value);
+
 /// The form as an effect of a rig, with its starts.
 std::shared_ptr<const Effect> as_effect(const Form& form);
 

@@ -67,7 +67,7 @@ TEST_P(CurvesOfState, FollowTheForce) {
     found[k] = force_of(curve->form.law, curve->form.starts.front(), states(k, 0), states(k, 1));
   }
   is = beside_the_rig(states, is);
-  // A start for the fit, which goes on from there: 0.5 to 5 % are missed of these.
+  // A start for the fit, which goes on from there: 0.3 to 6.6 % are missed of these.
   EXPECT_LT((found - is - states * states.householderQr().solve(found - is)).norm(), 0.1 * is.norm()) << curve->form.law.force_text;
   EXPECT_TRUE(curve->form.law.is_curve());
 }
@@ -106,7 +106,7 @@ TEST(CurveOfState, HasNoMoreTermsThanTheEvidenceAsksFor) {
   EXPECT_EQ(curve->form.law.force_text, "-c1 * x^2 * v * abs(v)");
 }
 
-/// Regression on the true force alone, along the true states: its size is one, and what is left is the noise.
+/// Regression on the true force alone, along the states that the decays ask for: its size is one.
 TEST(LawRegression, FindsTheSizeOfAForceThatIsKnown) {
   const Force force = [](double x, double) { return -0.1 * stiffness * x * x; };
   const FitProblem problem = two_decays::problem(force);
