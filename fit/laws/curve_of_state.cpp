@@ -90,33 +90,10 @@ void sweep(MatrixXd& a, Index i) {
   a(i, i) = -1 / pivot;
 }
 
-/// Forward, each time the term that is worth most, and backward, what that made worth less than its price.
 Sum choose(const LawRegression::Level& level, double price) {
-  constexpr double dependent = 1e-7;  // share of a column that those chosen leave of it
-  const Index count = level.products.rows() - 1;
-  VectorXd scale = level.products.diagonal().cwiseMax(1e-300).cwiseSqrt();
-  scale[count] = 1;
-  MatrixXd a = scale.cwiseInverse().asDiagonal() * level.products * scale.cwiseInverse().asDiagonal();
-  Sum sum;
-  while (sum.terms.size() < most_terms) {
-    Index next = -1;
-    double most = price;
-    for (Index i = 0; i < count; ++i)
-      if (a(i, i) > dependent)
-        if (const double worth = a(i, count) * a(i, count) / a(i, i); worth > most) most = worth, next = i;
-    if (next < 0) break;
-    sweep(a, next);
-    sum.terms.push_back(next);
-    std::erase_if(sum.terms, [&](Index i) {
-      const bool is_idle = -a(i, count) * a(i, count) / a(i, i) < price;
-      if (is_idle) sweep(a, i);
-      return is_idle;
-    });
-  }
-  sum.coefficient.resize(static_cast<Index>(sum.terms.size()));
-  for (std::size_t k = 0; k < sum.terms.size(); ++k) sum.coefficient[static_cast<Index>(k)] = a(sum.terms[k], count) / scale[sum.terms[k]];
-  sum.cost = a(count, count) + level.entropy + price * static_cast<double>(sum.terms.size());
-  return sum;
+  SelectedColumns selected = select_columns(level.products, price, most_terms);
+  const double cost = selected.left + level.entropy + price * static_cast<double>(selected.columns.size());
+  return {std::move(selected.columns), std::move(selected.coefficient), cost};
 }
 
 Form form_of(const Sum& sum, const std::vector<std::string>& terms, const Reach& reach) {
@@ -162,6 +139,37 @@ BesideUnknownForces along(const FitProblem& problem, const Trial& base, const Fo
 }
 
 }  // namespace
+
+SelectedColumns select_columns(const MatrixXd& products, double price, std::size_t most) {
+  constexpr double dependent = 1e-7;  // share of a column that those chosen leave of it
+  const Index count = products.rows() - 1;
+  VectorXd scale = products.diagonal().cwiseMax(1e-300).cwiseSqrt();
+  scale[count] = 1;
+  MatrixXd a = scale.cwiseInverse().asDiagonal() * products * scale.cwiseInverse().asDiagonal();
+  SelectedColumns selected;
+  const auto worth = [&](Index i) { return a(i, count) * a(i, count) / std::abs(a(i, i)); };
+  double cost = INFINITY;
+  while (selected.columns.size() < most) {
+    Index next = -1;
+    for (Index i = 0; i < count; ++i)
+      if (a(i, i) > dependent && worth(i) > (next < 0 ? price : worth(next))) next = i;
+    if (next < 0) break;
+    sweep(a, next);
+    selected.columns.push_back(next);
+    const auto least = [&] { return std::min_element(selected.columns.begin(), selected.columns.end(), [&](Index i, Index k) { return worth(i) < worth(k); }); };
+    for (auto idle = least(); worth(*idle) < price; idle = least()) {
+      sweep(a, *idle);
+      selected.columns.erase(idle);
+    }
+    const double now = a(count, count) + price * static_cast<double>(selected.columns.size());
+    if (!(now < cost)) break;  // rounding goes in circles
+    cost = now;
+  }
+  selected.coefficient.resize(static_cast<Index>(selected.columns.size()));
+  for (std::size_t k = 0; k < selected.columns.size(); ++k) selected.coefficient[static_cast<Index>(k)] = a(selected.columns[k], count) / scale[selected.columns[k]];
+  selected.left = a(count, count);
+  return selected;
+}
 
 std::optional<CurveOfState> curve_of_state(const FitProblem& problem, const Trial& base, const BesideUnknownForces& beside, double least) {
   Reach reach = reach_of(beside);

@@ -1,11 +1,22 @@
 #pragma once
+#include <Eigen/Core>
 #include <optional>
+#include <vector>
 
 #include "fit/fit.h"
 #include "fit/laws/dictionary.h"
 #include "fit/search/effect_search.h"
 
 namespace unrig {
+
+/// Columns of a regression, and what they leave.
+struct SelectedColumns {
+  std::vector<Eigen::Index> columns;
+  Eigen::VectorXd coefficient;  ///< of least squares on these, in their order
+  double left = 0;              ///< sum of squares
+};
+/// Forward, each time the column that takes most of the sum of squares, and backward, what that made worth less than its `price`; at most `most`. `products`: [columns | readings]' [columns | readings].
+SelectedColumns select_columns(const Eigen::MatrixXd& products, double price, std::size_t most);
 
 /// What no formula fits: a surface over displacement and velocity of the first normal mode, the sum of as many terms as the evidence asks for.
 struct CurveOfState {

@@ -8,6 +8,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <random>
 
 #include "core/law/expression.h"
 #include "fit/laws/law_regression.h"
@@ -94,6 +95,40 @@ TEST(CurveOfState, IsNoneWhereNothingIsMissing) {
     const FitProblem problem = two_decays::problem([](double, double) { return 0.0; }, seed);
     const Trial base = fit_baseline(problem);
     EXPECT_FALSE(curve_of_state(problem, base, beside_unknown_forces(base.arrival.joint), decisive)) << seed;
+  }
+}
+
+/// Columns of which some are nearly sums of others, so that they leave again and come back: of those that stay the coefficients are those of least squares, each is worth its price, and none of the others is.
+TEST(SelectColumns, AreThoseOfLeastSquaresHoweverTheyWereFound) {
+  constexpr Index rows = 60, columns = 14;
+  constexpr double price = 4;
+  std::mt19937_64 random(8);
+  std::normal_distribution<double> normal;
+  const auto draw = [&](Index m, Index n) { return MatrixXd::NullaryExpr(m, n, [&] { return normal(random); }).eval(); };
+  const auto left_by = [](const MatrixXd& x, const VectorXd& y) { return x.cols() == 0 ? y.squaredNorm() : (y - x * x.colPivHouseholderQr().solve(y)).squaredNorm(); };
+  for (int trial = 0; trial < 300; ++trial) {
+    MatrixXd x = draw(rows, columns);
+    x.rightCols(8) = x.leftCols(6) * draw(6, 8) + 0.3 * x.rightCols(8);
+    const VectorXd y = x * draw(columns, 1) * 0.5 + draw(rows, 1);
+    MatrixXd all(rows, columns + 1);
+    all << x, y;
+    const SelectedColumns selected = select_columns(all.transpose() * all, price, columns);
+    const MatrixXd chosen = x(Eigen::all, selected.columns);
+    const VectorXd least_squares = chosen.colPivHouseholderQr().solve(y);
+    EXPECT_LT((selected.coefficient - least_squares).norm(), 1e-8 * least_squares.norm()) << trial << ": rounding";
+    const double left = left_by(chosen, y);
+    EXPECT_NEAR(selected.left, left, 1e-8 * y.squaredNorm()) << trial;
+    for (Index i = 0; i < columns; ++i) {
+      const auto place = std::find(selected.columns.begin(), selected.columns.end(), i);
+      std::vector<Index> others = selected.columns;
+      if (place != selected.columns.end()) {
+        others.erase(others.begin() + (place - selected.columns.begin()));
+        EXPECT_GE(left_by(x(Eigen::all, others), y) - left, price * (1 - 1e-8)) << trial;
+      } else {
+        others.push_back(i);
+        EXPECT_LE(left - left_by(x(Eigen::all, others), y), price * (1 + 1e-8)) << trial;
+      }
+    }
   }
 }
 
