@@ -161,13 +161,13 @@ void LawSearch::keep_most_evident(std::vector<AskedFor>& asked) const {
 }
 
 /// The same along the states that the decays ask for with a curve at work, and the curve itself. False where there is none, or its first terms have less than half of the evidence of the best formula.
-bool LawSearch::ask_for_a_curve(std::vector<AskedFor>& asked) const {
-  const double least = asked.empty() ? decisive : std::max(decisive, half_of_it * asked.front().evidence);
+bool LawSearch::ask_for_a_curve() {
+  const double least = asked_.empty() ? decisive : std::max(decisive, half_of_it * asked_.front().evidence);
   std::optional<CurveOfState> curve = curve_of_state(problem_, base_, beside_unknown_forces(base_.arrival.joint), least);
   if (!curve) return false;
-  asked = asked_along(curve->beside);
-  asked.push_back({std::move(curve->form), curve->evidence});
-  keep_most_evident(asked);
+  asked_ = asked_along(curve->beside);
+  asked_.push_back({std::move(curve->form), curve->evidence});
+  keep_most_evident(asked_);
   return true;
 }
 
@@ -228,31 +228,31 @@ LawSearch::Prospects LawSearch::prospects(const Trial& base, std::vector<Trial> 
 }
 
 /// Forms that may explain what laws of the list do not, or as well. Of one that leaves nothing of a mismatch too large for two laws to explain alike only what promises more with no more parameters is a rival.
-LawSearch::Prospects LawSearch::rivals(const Promised& promised, const std::vector<Trial>& tried) {
-  const bool none = base_.reduced_chi2() > nearly_explained && std::any_of(tried.begin(), tried.end(), [&](const Trial& t) { return !leaves_something_(t); });
-  Prospects forms = prospects(base_, screened_beside(base_, forms_worth_a_fit(base_, promised)), promised, none ? 1 : half_of_it);
+LawSearch::Prospects LawSearch::rivals_promised() {
+  const bool none = base_.reduced_chi2() > nearly_explained && std::any_of(found_.begin(), found_.end(), [&](const Trial& t) { return !leaves_something_(t); });
+  Prospects forms = prospects(base_, screened_beside(base_, forms_worth_a_fit(base_, promised_)), promised_, none ? 1 : half_of_it);
   const auto parameters = [&](const Trial& t) { return effect(problem_.rig, t.effects.back()).parameters_on(problem_.rig).size(); };
-  if (none) std::erase_if(forms.laws, [&](const Trial& t) { return parameters(t) > parameters(tried.front()); });
+  if (none) std::erase_if(forms.laws, [&](const Trial& t) { return parameters(t) > parameters(found_.front()); });
   return forms;
 }
 
 /// The same of those that the decays ask for: where a law of the list leaves nothing only formulas with more evidence, and none where a signal promises more than any law to first order, unless a curve is among them.
-LawSearch::Prospects LawSearch::rivals(const std::vector<AskedFor>& asked, bool with_curve, const Promised& promised, const std::vector<Trial>& tried) {
-  const auto explains = std::find_if(tried.begin(), tried.end(), [&](const Trial& t) { return !leaves_something_(t); });  // noise of a colour takes up what another law leaves
+LawSearch::Prospects LawSearch::rivals_asked_for() {
+  const bool is_explained_by_list = !has_curve_ && std::any_of(found_.begin(), found_.end(), [&](const Trial& t) { return !leaves_something_(t); });  // noise of a colour takes up what another law leaves
   std::vector<std::string> ids;
   keep_laws_of(base_);
-  for (const AskedFor& a : asked) {
+  for (const AskedFor& a : asked_) {
     if (is_among(base_.effects, a.form.law.id())) continue;
     if (!a.form.listed.empty()) {
-      if (explains != tried.end()) break;  // only forms with more evidence than any law of the list
+      if (is_explained_by_list) break;  // only forms with more evidence than any law of the list
       continue;
     }
-    if (explains != tried.end() && coefficients_of(a.form.law).size() > 1) continue;  // curves are for what no formula explains
+    if (is_explained_by_list && coefficients_of(a.form.law).size() > 1) continue;  // curves are for what no formula explains
     problem_.rig.laws.push_back(as_effect(a.form));
     ids.push_back(a.form.law.id());
   }
   std::vector<Trial> screened = screened_beside(base_, ids);
-  return with_curve ? Prospects{std::move(screened), promised} : prospects(base_, std::move(screened), promised, 0);
+  return has_curve_ ? Prospects{std::move(screened), promised_} : prospects(base_, std::move(screened), promised_, 0);
 }
 
 /// By the free decays; runs that are driven from first guesses, in full.
@@ -271,16 +271,16 @@ void LawSearch::in_order_of_parameters(std::vector<Trial>& tried) const {
   });
 }
 
-/// Fits in full those that are worth it, and adds them to `all`; where the limits of the search are reached, what the decays have told by then. Of the list, where a mismatch is too large for two laws to explain alike, none behind one that leaves nothing. Forms are all fitted: some are rivals.
+/// Fits in full those that are worth it, and adds them to what was found; where the limits of the search are reached, what the decays have told by then. Of the list, where a mismatch is too large for two laws to explain alike, none behind one that leaves nothing. Forms are all fitted: some are rivals.
 /// `from_here`: laws are followed from the sizes at which they stand only.
-void LawSearch::follow(std::vector<Trial> tried, const Trial& base, bool from_here, std::vector<Trial>& all) const {
+void LawSearch::follow(std::vector<Trial> tried, const Trial& base, bool from_here) {
   const bool driven = all_driven(base.arrival.joint), by_decays = shows_in_decays(base);
   const bool one_will_do = base.reduced_chi2() > nearly_explained && std::none_of(tried.begin(), tried.end(), [](const Trial& t) { return is_law_id(t.effects.back()); });
   const auto excess = [](const Trial& t) { return std::max(0.0, left_of_decays(t) - 1); };
   const auto follows_decays = [&](const Trial& t) { return !t.ruled_out && (!by_decays || excess(t) < explained - 1); };
   const auto told = [&](const Trial& t) { return by_decays && std::isfinite(t.decays.chi2); };  // near the noise decays are not fitted by themselves
   const auto is_near = [&](const Trial& t) { return !told(t) || left_of_decays(t) < nearly_explained; };  // what leaves more of the decays is at most what another law acts beside
-  const std::size_t others = all.size();
+  const std::size_t others = found_.size();
   double least = INFINITY;
   const auto follow_some = [&](std::size_t first, std::size_t& end) {
     if (one_will_do) {
@@ -296,23 +296,23 @@ void LawSearch::follow(std::vector<Trial> tried, const Trial& base, bool from_he
     // Of thousands of samples twice the excess of another is beyond any evidence.
     for (std::size_t i = first; i < end; ++i)
       if (told(tried[i]) && !tried[i].ruled_out) least = std::min(least, std::max(excess(tried[i]), explained - 1));
-    const std::size_t before = all.size();
+    const std::size_t before = found_.size();
     for (std::size_t i = first; i < end; ++i)
-      if (!tried[i].ruled_out && !(told(tried[i]) && excess(tried[i]) > 2 * least)) all.push_back(std::move(tried[i]));
-    in_parallel(all.size() - before, [&](std::size_t i) {
-      if (!driven && is_near(all[before + i])) follow_further(all[before + i], INFINITY);
+      if (!tried[i].ruled_out && !(told(tried[i]) && excess(tried[i]) > 2 * least)) found_.push_back(std::move(tried[i]));
+    in_parallel(found_.size() - before, [&](std::size_t i) {
+      if (!driven && is_near(found_[before + i])) follow_further(found_[before + i], INFINITY);
     });
   };
   try {
     for (std::size_t first = 0, end = 0; first < tried.size(); first = end) {
       follow_some(first, end);
-      if (one_will_do && std::any_of(all.begin() + static_cast<std::ptrdiff_t>(others), all.end(), leaves_nothing)) break;
+      if (one_will_do && std::any_of(found_.begin() + static_cast<std::ptrdiff_t>(others), found_.end(), leaves_nothing)) break;
     }
   } catch (const OutOfTime&) {
     TimeLimit::lift();
     for (Trial& t : tried)
-      if (!t.effects.empty() && !t.ruled_out && std::isfinite(t.decays.chi2)) all.push_back(std::move(t));
-    for (std::size_t i = others; i < all.size(); ++i) measure(all[i]);
+      if (!t.effects.empty() && !t.ruled_out && std::isfinite(t.decays.chi2)) found_.push_back(std::move(t));
+    for (std::size_t i = others; i < found_.size(); ++i) measure(found_[i]);
     throw;
   }
 }
@@ -324,11 +324,13 @@ bool LawSearch::signals_leave_nothing(const Promised& promised) const {
   return promised.by_a_signal > promised.by_a_law && promised.left_by_a_signal < explained * noise;
 }
 
-/// Whether the best of these, the first, asks for another law beside it.
-bool LawSearch::goes_on(const std::vector<Trial>& tried) {
-  if (tried.empty() || tried.front().effects.size() >= most_effects || runs_away(tried.front()) || !leaves_something_(tried.front())) return false;
-  const bool takes_from_decays = shows_in_decays(base_) && left_of_decays(tried.front()) < half_of_it * left_of_decays(base_);  // other runs may not have been followed
-  return (takes_from_decays || bic_difference(tried.front(), base_) < 0) && !is_explained(tried.front());
+/// Whether the best asks for another law beside it.
+bool LawSearch::goes_on() {
+  if (found_.empty()) return false;
+  const Trial& best = found_.front();
+  if (best.effects.size() >= most_effects || runs_away(best) || !leaves_something_(best)) return false;
+  const bool takes_from_decays = shows_in_decays(base_) && left_of_decays(best) < half_of_it * left_of_decays(base_);  // other runs may not have been followed
+  return (takes_from_decays || bic_difference(best, base_) < 0) && !is_explained(best);
 }
 
 /// Whether it leaves nothing, or what noise of a colour or the rig's description explains.
@@ -340,105 +342,137 @@ bool LawSearch::is_explained(const Trial& trial) {
 }
 
 /// A search among many ends before the least chi-square of any: where it is near, the first is taken there before it is asked what it leaves. Of runs that are driven, from first guesses with what is known of the law by now.
-void LawSearch::settle_first(std::vector<Trial>& tried) {
-  if (tried.empty() || tried.front().is_settled || !leaves_something_(tried.front()) || tried.front().reduced_chi2() > nearly_explained || decays_decide(tried.front()) || bic_difference(tried.front(), base_) >= 0) return;
-  if (all_driven(tried.front().arrival.joint)) fit_from_first_guesses(problem_, tried.front());
-  settle(tried.front());
-  tried.front() = with_lost_runs_followed(std::move(tried.front()));
-  tried.front() = in_finer_steps(std::move(tried.front()));
-  tried.front().is_settled = true;
+void LawSearch::settle_first() {
+  if (found_.empty()) return;
+  Trial& best = found_.front();
+  if (best.is_settled || !leaves_something_(best) || best.reduced_chi2() > nearly_explained || decays_decide(best) || bic_difference(best, base_) >= 0) return;
+  if (all_driven(best.arrival.joint)) fit_from_first_guesses(problem_, best);
+  settle(best);
+  best = with_lost_runs_followed(std::move(best));
+  best = in_finer_steps(std::move(best));
+  best.is_settled = true;
 }
 
 std::vector<Trial> LawSearch::search() {
-  std::vector<Trial> all;
   try {
-    search_in_order(all);
+    tell("looking for the law of what is missing" + (base_.effects.empty() ? std::string() : " beside " + base_.effects.back()));
+    if (among_ == Among::laws_and_forms) {
+      if (goes_by_evidence()) follow_what_decays_ask_for();
+      if (!any_explains()) follow_the_list();
+    }
+    if (!signals_leave_nothing(promised_)) {
+      if (shows_in_decays(base_)) look_for_a_curve();
+      follow_rivals();
+      if (goes_on()) look_for_a_second();
+      take_away();
+      settle_rivals();
+    }
   } catch (const OutOfTime&) {  // what has been fitted stands
     TimeLimit::lift();
   }
-  std::erase_if(all, runs_away);
-  sort_by(all, [&](const Trial& t) { return bic_difference(t, base_); });
-  return all;
+  std::erase_if(found_, runs_away);
+  sort_by(found_, [&](const Trial& t) { return bic_difference(t, base_); });
+  return std::move(found_);
 }
 
-void LawSearch::search_in_order(std::vector<Trial>& all) {
-  const auto tell = [&](const Trial& base) {
-    if (problem_.progress) problem_.progress("looking for the law of what is missing" + (base.effects.empty() ? std::string() : " beside " + base.effects.back()));
-  };
-  const auto try_all = [&](std::vector<Trial> trials, const Trial& base, bool from_here = true) {
-    follow(std::move(trials), base, from_here, all);
-    sort_by(all, [&](const Trial& t) { return bic_difference(t, base_); });
-    settle_first(all);
-  };
-  const auto any_explains = [&] { return std::any_of(all.begin(), all.end(), [&](const Trial& t) { return is_explained(t); }); };
-  tell(base_);
-  Promised promised;
-  const bool by_decays = among_ == Among::laws_and_forms && base_.reduced_chi2() > nearly_explained && shows_in_decays(base_);
-  std::vector<AskedFor> asked, of_list;
-  std::vector<Trial> dear;  // laws followed in small steps, behind all others of the list
-  const auto try_the_first_two = [&] {
-    if (of_list.size() > 1 && !any_explains()) try_all({begun_with({of_list[0], of_list[1]})}, base_);
-  };
-  if (by_decays) {
-    asked = asked_along(beside_unknown_forces(base_.arrival.joint));
-    keep_most_evident(asked);
-    std::copy_if(asked.begin(), asked.end(), std::back_inserter(of_list), [](const AskedFor& a) { return !a.form.listed.empty(); });
-    std::vector<Trial> alone;
-    for (const AskedFor& a : of_list) {
-      Trial trial = begun_with({a});
-      (decays_decide(trial) ? dear : alone).push_back(std::move(trial));
-    }
-    try_all(std::move(alone), base_, false);
-    if (dear.empty()) try_the_first_two();
+/// Far from the noise a step to first order says little.
+bool LawSearch::goes_by_evidence() const { return among_ == Among::laws_and_forms && base_.reduced_chi2() > nearly_explained && shows_in_decays(base_); }
+
+bool LawSearch::any_explains() {
+  return std::any_of(found_.begin(), found_.end(), [&](const Trial& t) { return is_explained(t); });
+}
+
+/// Follows these, and what was found is in order again.
+void LawSearch::try_all(std::vector<Trial> trials, const Trial& base, bool from_here) {
+  follow(std::move(trials), base, from_here);
+  sort_by(found_, [&](const Trial& t) { return bic_difference(t, base_); });
+  settle_first();
+}
+
+/// What the decays ask for, once.
+void LawSearch::ask_decays() {
+  if (std::exchange(asked_decays_, true)) return;
+  asked_ = asked_along(beside_unknown_forces(base_.arrival.joint));
+  keep_most_evident(asked_);
+}
+
+/// Laws of the list, each by itself and the first two together; those that are followed in small steps behind all others (follow_the_list).
+void LawSearch::follow_what_decays_ask_for() {
+  ask_decays();
+  std::vector<Trial> alone;
+  for (const AskedFor& a : asked_) {
+    if (a.form.listed.empty()) continue;
+    Trial trial = begun_with({a});
+    (decays_decide(trial) ? dear_ : alone).push_back(std::move(trial));
   }
-  const bool found = any_explains();
-  if (among_ == Among::laws_and_forms && !found) {
-    std::vector<std::string> ids = of_the_list(base_);
-    std::erase_if(ids, [&](const std::string& id) { return std::any_of(asked.begin(), asked.end(), [&](const AskedFor& a) { return a.form.listed == id; }); });
-    screened_ = screened_beside(base_, ids);
-    Prospects laws = prospects(base_, screened_, {});
-    promised = laws.promised;
-    in_order_of_parameters(laws.laws);
-    try_all(std::move(laws.laws), base_);
-    if (!dear.empty() && !any_explains()) {
-      try_all(std::move(dear), base_, false);
-      try_the_first_two();
-    }
-  }
-  if (!found && signals_leave_nothing(promised)) return;
-  // What has a name by now, whatever remains beside it, is no curve.
-  const bool is_named = any_explains() || (!all.empty() && all.front().excess() < (1 - enough_to_name) * base_.excess());
-  bool has_curve = false;
-  if (shows_in_decays(base_) && !is_named) {
-    if (!by_decays) keep_most_evident(asked = asked_along(beside_unknown_forces(base_.arrival.joint)));
-    has_curve = ask_for_a_curve(asked);
-  }
-  if (has_curve) {
-    keep_laws_of(base_);
-    std::vector<Trial> listed;
-    for (const AskedFor& a : asked)
-      if (!a.form.listed.empty()) listed.push_back(begun_with({a}));
-    try_all(std::move(listed), base_, false);
-  }
+  try_all(std::move(alone), base_, false);
+  if (dear_.empty()) try_the_first_two();
+}
+
+void LawSearch::try_the_first_two() {
+  std::vector<AskedFor> of_list;
+  std::copy_if(asked_.begin(), asked_.end(), std::back_inserter(of_list), [](const AskedFor& a) { return !a.form.listed.empty(); });
+  if (of_list.size() > 1 && !any_explains()) try_all({begun_with({of_list[0], of_list[1]})}, base_);
+}
+
+/// Laws of the list that promise most to first order, as far as the decays have not asked for them.
+void LawSearch::follow_the_list() {
+  std::vector<std::string> ids = of_the_list(base_);
+  std::erase_if(ids, [&](const std::string& id) { return std::any_of(asked_.begin(), asked_.end(), [&](const AskedFor& a) { return a.form.listed == id; }); });
+  screened_ = screened_beside(base_, ids);
+  Prospects laws = prospects(base_, screened_, {});
+  promised_ = laws.promised;
+  in_order_of_parameters(laws.laws);
+  try_all(std::move(laws.laws), base_);
+  if (dear_.empty() || any_explains()) return;
+  try_all(std::exchange(dear_, {}), base_, false);
+  try_the_first_two();
+}
+
+/// A curve, and laws of the list that are asked for along its states, where nothing takes all but a few per cent of the mismatch: what has a name, whatever remains beside it, is no curve.
+void LawSearch::look_for_a_curve() {
+  if (any_explains() || (!found_.empty() && found_.front().excess() < (1 - enough_to_name) * base_.excess())) return;
+  ask_decays();
+  has_curve_ = ask_for_a_curve();
+  if (!has_curve_) return;
+  keep_laws_of(base_);
+  std::vector<Trial> listed;
+  for (const AskedFor& a : asked_)
+    if (!a.form.listed.empty()) listed.push_back(begun_with({a}));
+  try_all(std::move(listed), base_, false);
+}
+
+/// Forms.
+void LawSearch::follow_rivals() {
   asked_forms_ = true;
-  try_all((by_decays || has_curve ? rivals(asked, has_curve, promised, all) : rivals(promised, all)).laws, base_);
-  if (goes_on(all)) {
-    Trial first = all.front();
-    tell(first);
-    if (!first.is_settled && !decays_decide(first) && !all_driven(first.arrival.joint)) settle(first);  // its motions may not have been followed, along which the second is to be seen
-    Prospects second = prospects(first, screened_beside(first, of_the_list(first)), {});
-    promised = second.promised;
-    in_order_of_parameters(second.laws);
-    try_all(std::move(second.laws), first);
-    if (goes_on(all)) try_all(prospects(first, screened_beside(first, forms_worth_a_fit(first, promised)), promised).laws, first);
-  }
-  if (!all.empty() && all.front().effects.size() > 1) {
-    problem_.rig.laws = all.front().arrival.joint.model().rig().laws;
-    for (Trial& fewer : taken_away(problem_, all.front())) all.push_back(std::move(fewer));
-  }
-  in_parallel(all.size(), [&](std::size_t i) {  // rivals are told apart by less than where a search among many ends
-    if ((leaves_nothing(all[i]) || (i == 0 && all[i].reduced_chi2() < nearly_explained)) && !decays_decide(all[i]) && !all[i].is_settled) settle(all[i]);
-    if (leaves_nothing(all[i]) && !decays_decide(all[i])) leave_out_terms(all[i]);  // forms have none
+  try_all((goes_by_evidence() || has_curve_ ? rivals_asked_for() : rivals_promised()).laws, base_);
+}
+
+/// Beside the best: of the list first, then of the dictionary.
+void LawSearch::look_for_a_second() {
+  Trial first = found_.front();
+  tell("looking for the law of what is missing beside " + first.effects.back());
+  if (!first.is_settled && !decays_decide(first) && !all_driven(first.arrival.joint)) settle(first);  // its motions may not have been followed, along which the second is to be seen
+  Prospects second = prospects(first, screened_beside(first, of_the_list(first)), {});
+  promised_ = second.promised;
+  in_order_of_parameters(second.laws);
+  try_all(std::move(second.laws), first);
+  if (goes_on()) try_all(prospects(first, screened_beside(first, forms_worth_a_fit(first, promised_)), promised_).laws, first);
+}
+
+/// What a second law made superfluous.
+void LawSearch::take_away() {
+  if (found_.empty() || found_.front().effects.size() < 2) return;
+  problem_.rig.laws = found_.front().arrival.joint.model().rig().laws;
+  for (Trial& fewer : taken_away(problem_, found_.front())) found_.push_back(std::move(fewer));
+}
+
+/// Rivals are told apart by less than where a search among many ends.
+void LawSearch::settle_rivals() {
+  in_parallel(found_.size(), [&](std::size_t i) {
+    Trial& trial = found_[i];
+    if ((leaves_nothing(trial) || (i == 0 && trial.reduced_chi2() < nearly_explained)) && !decays_decide(trial) && !trial.is_settled) settle(trial);
+    if (leaves_nothing(trial) && !decays_decide(trial)) leave_out_terms(trial);  // forms have none
   });
 }
 

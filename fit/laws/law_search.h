@@ -64,30 +64,49 @@ class LawSearch {
   };
   std::vector<AskedFor> asked_along(const BesideUnknownForces& beside) const;
   void keep_most_evident(std::vector<AskedFor>& asked) const;
-  bool ask_for_a_curve(std::vector<AskedFor>& asked) const;
+  bool ask_for_a_curve();
   void keep_laws_of(const Trial& base);
   Trial begun_with(const std::vector<AskedFor>& asked) const;
   void in_order_of_parameters(std::vector<Trial>& tried) const;
-  Prospects rivals(const std::vector<AskedFor>& asked, bool with_curve, const Promised& promised, const std::vector<Trial>& tried);
+  Prospects rivals_asked_for();
   std::vector<Trial> screened_beside(const Trial& base, const std::vector<std::string>& ids) const;
   Prospects prospects(const Trial& base, std::vector<Trial> screened, const Promised& known, double least = half_of_it) const;
-  Prospects rivals(const Promised& promised, const std::vector<Trial>& tried);
+  Prospects rivals_promised();
   bool signals_leave_nothing(const Promised& promised) const;
   std::vector<double> screen_forms(const Trial& base, const Screening& screening, std::vector<Form>& forms, const std::vector<std::size_t>& which);
   std::vector<std::string> forms_worth_a_fit(const Trial& base, const Promised& known);
   std::vector<std::string> of_the_list(const Trial& base) const;
   void follow_decays(Trial& trial, const Trial& base, bool from_here) const;
   bool is_explained(const Trial& trial);
-  void settle_first(std::vector<Trial>& tried);
-  void follow(std::vector<Trial> tried, const Trial& base, bool from_here, std::vector<Trial>& all) const;
-  void search_in_order(std::vector<Trial>& all);
-  bool goes_on(const std::vector<Trial>& tried);
+  void settle_first();
+  void follow(std::vector<Trial> tried, const Trial& base, bool from_here);
+  void try_all(std::vector<Trial> trials, const Trial& base, bool from_here = true);
+  bool goes_by_evidence() const;
+  bool any_explains();
+  bool goes_on();
+  void ask_decays();
+  void follow_what_decays_ask_for();
+  void try_the_first_two();
+  void follow_the_list();
+  void look_for_a_curve();
+  void follow_rivals();
+  void look_for_a_second();
+  void take_away();
+  void settle_rivals();
+  void tell(const std::string& what) const {
+    if (problem_.progress) problem_.progress(what);
+  }
 
   FitProblem& problem_;
   const Trial& base_;
   Asked leaves_something_, is_no_law_;
   Among among_;
+  std::vector<Trial> found_;  // all that were followed, the best first
   std::vector<Trial> screened_;
+  std::vector<AskedFor> asked_;  // by the decays, the most evident first
+  std::vector<Trial> dear_;      // laws that are followed in small steps, behind all others of the list
+  Promised promised_;
+  bool asked_decays_ = false, has_curve_ = false;  // among what was asked for
   std::vector<std::string> explained_;  // last effects of sets that are known to leave nothing but noise of a colour or the rig's description
   bool asked_forms_ = false;
 };
