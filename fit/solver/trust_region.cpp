@@ -1,6 +1,7 @@
 #include "fit/solver/trust_region.h"
 
 #include <ceres/ceres.h>
+#include <glog/logging.h>
 
 #include <algorithm>
 #include <cmath>
@@ -182,6 +183,8 @@ SearchOutcome search(const LeastSquaresProblem& problem, const LeastSquaresPoint
     ceres::Solve(options, &ceres_problem, &summary);
     outcome.iterations += static_cast<int>(summary.iterations.size()) - 1;
   };
+  // A search that ends where the model has no slopes is an outcome; Ceres logs it as an error, silent or not.
+  if (!google::IsGoogleLoggingInitialized()) FLAGS_minloglevel = google::GLOG_FATAL;
   constexpr int homotopy_iterations = 10;
   constexpr double homotopy_change = 1e-3;
   for (int step = 1; step < strategy.homotopy_steps; ++step) {
