@@ -4,7 +4,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 #include <random>
+#include <utility>
 
 #include "core/files/error.h"
 #include "tests/fit/run_cases.h"
@@ -273,6 +275,21 @@ TEST(MotionWindows, CoverASoftStartAndAShaftThatNeverStops) {
   EXPECT_LE(windows[0].knots.first, 520) << "the angle is within its noise up to here";
   EXPECT_GT(windows[0].knots.first, 350);
   EXPECT_GE(windows[0].knots.last, run.samples() - 2) << "free to the end";
+}
+
+/// Electrical spikes half a block before the shaft moves, while it does and soon after: twenty samples on the mean are moved by ten times what noise does, and a motion that seems long has sparse knots.
+TEST(MotionWindows, AreNoWiderForSpikesBesideTheMotion) {
+  unrig::Run run = read_run(test::null_campaign("step_a.csv"));
+  const Windows windows = motion_windows(run);
+  Channel& alpha = *std::find_if(run.channels.begin(), run.channels.end(), [](const Channel& c) { return c.name == "alpha"; });
+  for (const auto& [sample, degrees] : {std::pair<Index, double>{469, 0.5}, {488, -0.4}, {532, -0.3}, {560, 0.3}}) alpha.value[sample] += degrees * std::numbers::pi / 180;
+  const Windows spiked = motion_windows(run);
+  ASSERT_EQ(spiked.size(), windows.size());
+  for (std::size_t w = 0; w < windows.size(); ++w) {
+    EXPECT_EQ(spiked[w].stride, windows[w].stride);
+    EXPECT_NEAR(static_cast<double>(spiked[w].knots.first), static_cast<double>(windows[w].knots.first), 8);
+    EXPECT_NEAR(static_cast<double>(spiked[w].knots.last), static_cast<double>(windows[w].knots.last), 8);
+  }
 }
 
 /// "A window of the motion needs knots inside the record": the knots of a long record lie further apart than its shortest motions last.
