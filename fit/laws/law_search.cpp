@@ -163,7 +163,7 @@ void LawSearch::keep_most_evident(std::vector<AskedFor>& asked) const {
 /// The same along the states that the decays ask for with a curve at work, and the curve itself. False where there is none, or its first terms have less than half of the evidence of the best formula.
 bool LawSearch::ask_for_a_curve() {
   const double least = asked_.empty() ? decisive : std::max(decisive, half_of_it * asked_.front().evidence);
-  std::optional<CurveOfState> curve = curve_of_state(problem_, base_, beside_unknown_forces(base_.arrival.joint), least);
+  std::optional<CurveOfState> curve = curve_of_state(problem_, base_, *beside_, least);
   if (!curve) return false;
   asked_ = asked_along(curve->beside);
   asked_.push_back({std::move(curve->form), curve->evidence});
@@ -391,8 +391,9 @@ void LawSearch::try_all(std::vector<Trial> trials, const Trial& base, bool from_
 
 /// What the decays ask for, once.
 void LawSearch::ask_decays() {
-  if (std::exchange(asked_decays_, true)) return;
-  asked_ = asked_along(beside_unknown_forces(base_.arrival.joint));
+  if (beside_) return;
+  beside_ = beside_unknown_forces(base_.arrival.joint);
+  asked_ = asked_along(*beside_);
   keep_most_evident(asked_);
 }
 

@@ -1,6 +1,7 @@
 #pragma once
 #include <cmath>
 #include <functional>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -106,7 +107,8 @@ class LawSearch {
   std::vector<AskedFor> asked_;  // by the decays, the most evident first
   std::vector<Trial> dear_;      // laws that are followed in small steps, behind all others of the list
   Promised promised_;
-  bool asked_decays_ = false, has_curve_ = false;  // among what was asked for
+  std::optional<BesideUnknownForces> beside_;  // what that is told along
+  bool has_curve_ = false;  // among what was asked for
   std::vector<std::string> explained_;  // last effects of sets that are known to leave nothing but noise of a colour or the rig's description
   bool asked_forms_ = false;
 };

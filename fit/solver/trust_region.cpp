@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <mutex>
 #include <vector>
 
 #include "fit/solver/gauss_newton.h"
@@ -150,6 +151,14 @@ class EnoughIsEnough : public ceres::IterationCallback {
   const SearchLimits& limits_;
 };
 
+/// A search that ends where the model has no slopes is an outcome. Ceres logs it as an error, silent or not; a program that has a log of its own keeps it.
+void say_nothing() {
+  static std::once_flag once;
+  std::call_once(once, [] {
+    if (!google::IsGoogleLoggingInitialized()) FLAGS_minloglevel = google::GLOG_FATAL;
+  });
+}
+
 }  // namespace
 
 SearchOutcome search(const LeastSquaresProblem& problem, const LeastSquaresPoint& start, const SearchStrategy& strategy, const SearchLimits& limits) {
@@ -183,8 +192,7 @@ SearchOutcome search(const LeastSquaresProblem& problem, const LeastSquaresPoint
     ceres::Solve(options, &ceres_problem, &summary);
     outcome.iterations += static_cast<int>(summary.iterations.size()) - 1;
   };
-  // A search that ends where the model has no slopes is an outcome; Ceres logs it as an error, silent or not.
-  if (!google::IsGoogleLoggingInitialized()) FLAGS_minloglevel = google::GLOG_FATAL;
+  say_nothing();
   constexpr int homotopy_iterations = 10;
   constexpr double homotopy_change = 1e-3;
   for (int step = 1; step < strategy.homotopy_steps; ++step) {

@@ -48,6 +48,19 @@ TEST(LeastSquares, RosenbrockFromTheUsualStart) {
   EXPECT_EQ(result.attempts.size(), 1u) << "an easy problem must not pay for restarts";
 }
 
+/// Ceres logs such an end as an error, whatever it is told of logging.
+TEST(LeastSquares, SaysNothingWhereTheModelHasNoSlopes) {
+  const LeastSquaresProblem problem = problem_of({named("x", 0)}, 1, [](const VectorXd& x, VectorXd& r, MatrixXd& jacobian) {
+    r << 5 - x[0];
+    jacobian << (x[0] > 1 ? std::nan("") : -1);
+    return true;
+  });
+  testing::internal::CaptureStderr();
+  const LeastSquaresResult result = solve_least_squares(problem, to_the_last_digit());
+  EXPECT_EQ(testing::internal::GetCapturedStderr(), "");
+  EXPECT_FALSE(result.arrived);
+}
+
 /// (1 - x)^4 as one residual: Gauss-Newton halves the way at every step.
 TEST(LeastSquares, EndsWhereChiSquareIsEnough) {
   const LeastSquaresProblem problem = problem_of({named("x", 3)}, 1, [](const VectorXd& x, VectorXd& r, MatrixXd& jacobian) {
