@@ -244,16 +244,15 @@ void DiagnosisSearch::look_for_forms_beside(const Trial& base) {
 
 void DiagnosisSearch::look_for_the_law_of_what_remains() {
   const bool one_law = found_.best.effects.size() == 1 && brings_a_law(found_.best);  // forms may be its rivals
-  if (may_find_laws_ && mismatch_.found && !laws_ && !described_ && (!found_.explains() || one_law)) {
+  if (may_find_laws_ && mismatch_.found && !laws_ && !described_ && (!found_.explains() || one_law))
     limits_.spend([&] {
       tell("looking for the law of what is missing");
       // Forms were held against laws of the list before, and are looked for beside what takes most of the mismatch below.
       if (!asked_forms_ && (one_law || found_.best.excess() > half_of_it * baseline_.excess())) look_for_forms_beside(baseline_);
       const bool were_looked_for = begun_ && same_set(begun_->effects, found_.best.effects);
       if (!found_.best.effects.empty() && !were_looked_for && !found_.explains()) look_for_forms_beside(found_.best);
+      laws_ = choose_law(problem_, fit_problem_, files(), baseline_, laws_tried_, *selection_, found_);
     });
-    limits_.describe([&] { laws_ = choose_law(problem_, fit_problem_, files(), baseline_, laws_tried_, *selection_, found_); });  // of what was fitted by then
-  }
   if (!laws_) fit_problem_.rig.laws.clear();  // a search that was stopped leaves its forms there
   if (!exact_) return;
   for (const Trial& t : laws_tried_) exact_->hold_against(t);
