@@ -60,11 +60,6 @@ Index soft_edge(Index blocks, Index block, double white_scatter, Mean mean) {
   return reach > 0 ? std::min(blocks, reach + unseen) * block : 0;
 }
 
-/// Not a number where none is finite.
-double mean_of_finite(const Eigen::Ref<const VectorXd>& readings) {
-  return readings.array().isFinite().select(readings, 0).sum() / static_cast<double>(readings.array().isFinite().count());
-}
-
 /// Where the shaft moves, soft beginnings and ends included.
 std::vector<Interval> moving_softly(const VectorXd& angle, double sigma) {
   std::vector<Interval> intervals = moving(angle, sigma);
@@ -72,11 +67,13 @@ std::vector<Interval> moving_softly(const VectorXd& angle, double sigma) {
   const double scatter = sigma / std::sqrt(static_cast<double>(block));
   const std::vector<Interval> hard = intervals;
   const std::vector<bool> is_spike = isolated_spikes(angle, sigma, hard);  // one beside a motion would widen it
-  const VectorXd without_spikes = VectorXd::NullaryExpr(angle.size(), [&](Index k) { return is_spike[static_cast<std::size_t>(k)] ? std::nan("") : angle[k]; });
+  VectorXd without_spikes = angle;
+  for (Index k = 1; k < angle.size(); ++k)
+    if (is_spike[static_cast<std::size_t>(k)]) without_spikes[k] = without_spikes[k - 1];
   for (std::size_t i = 0; i <= hard.size() && !hard.empty(); ++i) {  // the rest before interval i
     const Index first = i == 0 ? 0 : hard[i - 1].last, last = i == hard.size() ? angle.size() : hard[i].first, blocks = (last - first) / block;
-    if (i < hard.size()) intervals[i].first -= soft_edge(blocks, block, scatter, [&](Index k) { return mean_of_finite(without_spikes.segment(last - (k + 1) * block, block)); });
-    if (i > 0) intervals[i - 1].last += soft_edge(blocks, block, scatter, [&](Index k) { return mean_of_finite(without_spikes.segment(first + k * block, block)); });
+    if (i < hard.size()) intervals[i].first -= soft_edge(blocks, block, scatter, [&](Index k) { return without_spikes.segment(last - (k + 1) * block, block).mean(); });
+    if (i > 0) intervals[i - 1].last += soft_edge(blocks, block, scatter, [&](Index k) { return without_spikes.segment(first + k * block, block).mean(); });
   }
   return intervals;
 }

@@ -277,7 +277,7 @@ TEST(MotionWindows, CoverASoftStartAndAShaftThatNeverStops) {
   EXPECT_GE(windows[0].knots.last, run.samples() - 2) << "free to the end";
 }
 
-/// Electrical spikes half a block before the shaft moves, while it does and soon after: twenty samples on the mean are moved by ten times what noise does, and a motion that seems long has sparse knots.
+/// Electrical spikes before the shaft moves, while it does and after: each moves the mean of twenty samples by ten times what noise does, and a motion that seems long has sparse knots.
 TEST(MotionWindows, AreNoWiderForSpikesBesideTheMotion) {
   unrig::Run run = read_run(test::null_campaign("step_a.csv"));
   const Windows windows = motion_windows(run);
