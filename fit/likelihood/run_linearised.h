@@ -1,7 +1,4 @@
 #pragma once
-#include <Eigen/QR>
-#include <algorithm>
-#include <cmath>
 #include <memory>
 #include <mutex>
 #include <optional>
@@ -10,6 +7,7 @@
 
 #include "core/propagate/exact_step.h"
 #include "core/numerics/householder.h"
+#include "fit/likelihood/eliminator.h"
 #include "fit/likelihood/rest_rows.h"
 #include "fit/likelihood/run_residual.h"
 
@@ -22,81 +20,6 @@ struct InputNoiseModel;
 class WanderingForce;
 
 namespace run_rows {
-
-/// The upper triangular (or trapezoidal) factor of `rows`: the same inner products in no more rows than columns.
-inline Eigen::MatrixXd compress(Eigen::MatrixXd rows) { return Householder(std::move(rows)).triangle(); }
-
-inline Eigen::MatrixXd stacked(const std::vector<Eigen::MatrixXd>& blocks, Eigen::Index columns) {
-  Eigen::Index total = 0;
-  for (const Eigen::MatrixXd& block : blocks) total += block.rows();
-  Eigen::MatrixXd stack(total, columns);
-  Eigen::Index row = 0;
-  for (const Eigen::MatrixXd& block : blocks) {
-    stack.middleRows(row, block.rows()) = block;
-    row += block.rows();
-  }
-  return stack;
-}
-
-/// Least squares by column-scaled QR. Columns that the rows do not determine (a state that no channel sees) are left at zero.
-class Eliminator {
- public:
-  explicit Eliminator(const Eigen::MatrixXd& columns) : scale_(columns.colwise().norm().transpose().cwiseMax(1e-300).cwiseInverse()) {
-    constexpr double rank_tolerance = 1e-11;
-    const Eigen::MatrixXd scaled = columns * scale_.asDiagonal();
-    quick_ = Householder(scaled);
-    if (columns.rows() >= columns.cols() && (columns.cols() == 0 || quick_.factors().diagonal().cwiseAbs().minCoeff() > rank_tolerance)) return;
-    pivoted_.setThreshold(rank_tolerance);
-    pivoted_.compute(scaled);
-    deficient_ = true;
-  }
-  Eigen::Index rank() const { return deficient_ ? pivoted_.rank() : scale_.size(); }
-  /// Coordinates of `rows` in the columns' space (the first `rank` rows) and beside it.
-  Eigen::MatrixXd rotated(const Eigen::MatrixXd& rows) const {
-    return deficient_ ? Eigen::MatrixXd(pivoted_.householderQ().setLength(pivoted_.rank()).adjoint() * rows) : quick_.rotated(rows);
-  }
-  /// Solution of R x = rotated, back in the columns' own scale.
-  Eigen::MatrixXd solve(const Eigen::MatrixXd& rotated) const {
-    const Eigen::Index r = rank();
-    Eigen::MatrixXd x = Eigen::MatrixXd::Zero(scale_.size(), rotated.cols());
-    if (deficient_) {
-      x.topRows(r) = pivoted_.matrixQR().topLeftCorner(r, r).triangularView<Eigen::Upper>().solve(rotated.topRows(r));
-      x = pivoted_.colsPermutation() * x;
-    } else {
-      x = quick_.factors().topLeftCorner(r, r).triangularView<Eigen::Upper>().solve(rotated.topRows(r));
-    }
-    return scale_.asDiagonal() * x;
-  }
-  /// Column j of (R^T R)^-1: how the unknowns move with the score of unknown j. Zero for one that the rows do not determine.
-  Eigen::VectorXd covariance_column(Eigen::Index j) const {
-    const Eigen::Index r = rank();
-    Eigen::VectorXd score = scale_[j] * Eigen::VectorXd::Unit(scale_.size(), j);
-    if (deficient_) score = pivoted_.colsPermutation().transpose() * score;
-    const auto& factors = deficient_ ? pivoted_.matrixQR() : quick_.factors();
-    return solve(factors.topLeftCorner(r, r).triangularView<Eigen::Upper>().transpose().solve(score.head(r)));
-  }
-  /// R with R^T R = the columns' information matrix. Only where all columns are determined is it regular.
-  Eigen::MatrixXd factor() const {
-    const Eigen::Index n = scale_.size();
-    Eigen::MatrixXd r = Eigen::MatrixXd::Zero(n, n);
-    if (deficient_) {
-      const Eigen::Index k = rank();
-      Eigen::MatrixXd permuted = Eigen::MatrixXd::Zero(n, n);
-      permuted.topRows(k) = Eigen::MatrixXd(pivoted_.matrixQR().topRows(k).triangularView<Eigen::Upper>());
-      r = permuted * pivoted_.colsPermutation().transpose();
-      r = compress(r);
-    } else {
-      r = quick_.factors().topRows(n).triangularView<Eigen::Upper>();
-    }
-    return r * scale_.cwiseInverse().asDiagonal();
-  }
-
- private:
-  Eigen::VectorXd scale_;
-  Householder quick_;
-  Eigen::ColPivHouseholderQR<Eigen::MatrixXd> pivoted_;
-  bool deficient_ = false;
-};
 
 /// Weighted rows of a block on their way through its rotations: those that c reaches, and what is left of the others.
 struct Rotated {
@@ -144,18 +67,6 @@ class Block {
   Rotation joint_;                   // of what several stretches keep
 };
 
-/// Marquardt's (1963) step: s with least |R (s - full)|^2 + damping |D s|^2, D the lengths of R's columns.
-inline Eigen::VectorXd damped_step(const Eigen::MatrixXd& factor, const Eigen::VectorXd& full, double damping) {
-  const Eigen::Index n = factor.cols();
-  Eigen::MatrixXd rows(factor.rows() + n, n);
-  rows.topRows(factor.rows()) = factor;
-  rows.bottomRows(n) = (std::sqrt(damping) * factor.colwise().norm()).asDiagonal();
-  Eigen::VectorXd target = Eigen::VectorXd::Zero(rows.rows());
-  target.head(factor.rows()) = factor * full;
-  const Eliminator damped(rows);
-  return damped.solve(damped.rotated(target));
-}
-
 }  // namespace run_rows
 
 /// What follows from theta alone and is the same for all parts of a record: the free response without partials (of so many samples), and all responses with them. Kept for the theta that was asked for last.
@@ -200,13 +111,7 @@ struct RunResidual::Linearised {
   Eigen::MatrixXd end;                  // as their starts, behind the last sample
 
   /// Solves the stacked rows [c | y] for c, beside a sum of squares that c cannot reach.
-  void settle(const std::vector<Eigen::MatrixXd>& rows, Eigen::Index unknowns, double unreachable) {
-    const Eigen::MatrixXd stack = run_rows::stacked(rows, unknowns + 1);
-    eliminate = std::make_unique<run_rows::Eliminator>(stack.leftCols(unknowns));
-    const Eigen::MatrixXd rotated = eliminate->rotated(stack.rightCols(1));
-    linear = eliminate->solve(rotated);
-    chi2 = unreachable + rotated.bottomRows(rotated.rows() - eliminate->rank()).squaredNorm();
-  }
+  void settle(const std::vector<Eigen::MatrixXd>& rows, Eigen::Index unknowns, double unreachable);
   std::unique_ptr<run_rows::Eliminator> eliminate;
   Eigen::VectorXd linear;
   double chi2 = 0;

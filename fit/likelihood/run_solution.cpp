@@ -36,6 +36,14 @@ Index RunResidual::longest_phase(bool moving) const {
   return longest;
 }
 
+void RunResidual::Linearised::settle(const std::vector<MatrixXd>& rows, Index unknowns, double unreachable) {
+  const MatrixXd stack = stacked(rows, unknowns + 1);
+  eliminate = std::make_unique<run_rows::Eliminator>(stack.leftCols(unknowns));
+  const MatrixXd rotated = eliminate->rotated(stack.rightCols(1));
+  linear = eliminate->solve(rotated);
+  chi2 = unreachable + rotated.bottomRows(rotated.rows() - eliminate->rank()).squaredNorm();
+}
+
 std::shared_ptr<RunResidual::Linearised> RunResidual::linearise(const VectorXd& theta) const {
   auto lin = std::make_shared<Linearised>();
   lin->noise = Linearised::noise_through(*this, theta);
