@@ -43,6 +43,7 @@ LawsTried search_laws(FitProblem& fit_problem, const Trial& baseline, const Tria
   LawsTried found{search.search(), search.asked_forms()};
   if (base.effects.empty()) selection.know(search.take_screened());
   for (const Trial& t : found.tried) selection.add({t.effects, t.reduced_chi2(), bic_difference(t, baseline), 0, 0});
+  for (const Trial& t : search.refuted()) selection.add({t.effects, t.reduced_chi2(), bic_difference(t, baseline), 0, 0, SearchOutcome::ruled_out});
   return found;
 }
 

@@ -282,6 +282,7 @@ void LawSearch::follow(std::vector<Trial> tried, const Trial& base, bool from_he
   const auto is_near = [&](const Trial& t) { return !told(t) || left_of_decays(t) < nearly_explained; };  // what leaves more of the decays is at most what another law acts beside
   const std::size_t others = found_.size();
   double least = INFINITY;
+  for (const Trial& t : found_) least = std::min(least, std::max(excess(t), explained - 1));
   const auto follow_some = [&](std::size_t first, std::size_t& end) {
     if (one_will_do) {
       bool follows = false;
@@ -297,8 +298,10 @@ void LawSearch::follow(std::vector<Trial> tried, const Trial& base, bool from_he
     for (std::size_t i = first; i < end; ++i)
       if (told(tried[i]) && !tried[i].ruled_out) least = std::min(least, std::max(excess(tried[i]), explained - 1));
     const std::size_t before = found_.size();
-    for (std::size_t i = first; i < end; ++i)
-      if (!tried[i].ruled_out && !(told(tried[i]) && excess(tried[i]) > 2 * least)) found_.push_back(std::move(tried[i]));
+    for (std::size_t i = first; i < end; ++i) {
+      const bool refuted = tried[i].ruled_out || (told(tried[i]) && excess(tried[i]) > 2 * least);
+      (refuted ? refuted_ : found_).push_back(std::move(tried[i]));
+    }
     in_parallel(found_.size() - before, [&](std::size_t i) {
       if (!driven && is_near(found_[before + i])) follow_further(found_[before + i], INFINITY);
     });

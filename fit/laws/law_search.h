@@ -45,6 +45,8 @@ class LawSearch {
   std::vector<Trial> search();
   /// Effects of the list as they were screened beside `base`, each by itself; none where the list was not asked.
   std::vector<Trial> take_screened() { return std::move(screened_); }
+  /// Those that the free decays speak against: they were followed no further.
+  const std::vector<Trial>& refuted() const { return refuted_; }
   /// Whether forms of the dictionary were looked for beside `base`.
   bool asked_forms() const { return asked_forms_; }
 
@@ -103,7 +105,7 @@ class LawSearch {
   Asked leaves_something_, is_no_law_;
   Among among_;
   std::vector<Trial> found_;  // all that were followed, the best first
-  std::vector<Trial> screened_;
+  std::vector<Trial> refuted_, screened_;
   std::vector<AskedFor> asked_;  // by the decays, the most evident first
   std::vector<Trial> dear_;      // laws that are followed in small steps, behind all others of the list
   Promised promised_;

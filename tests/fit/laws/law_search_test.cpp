@@ -13,6 +13,7 @@
 #include "core/numerics/work.h"
 #include "core/propagate/feedback_force.h"
 #include "fit/diagnose/diagnose.h"
+#include "fit/diagnose/law_answer.h"
 #include "fit/diagnose/selection.h"
 #include "fit/laws/found_law.h"
 #include "fit/laws/screen.h"
@@ -273,6 +274,32 @@ TEST(LawSearch, AStoppedSearchKeepsWhatItHas) {
     some += stopped.empty() ? 0 : 1;
   }
   EXPECT_GT(some, 0u) << "the decays are followed before the end";
+}
+
+/// Nobody has to fit again what leaves twice the excess of another of the decays.
+TEST(LawSearch, TellsWhatTheDecaysRefute) {
+  const double spring = 0.08 * stiffness;
+  FitProblem problem = two_decays::problem([&](double x, double) { return -spring * x * x * x; });
+  const Trial base = fit_baseline(problem);
+  const auto leaves_something = [](const Trial& t) { return what_remains(t).found; };
+  LawSearch search(problem, base, leaves_something, never, LawSearch::Among::forms);
+  const std::vector<Trial> found = search.search();
+  ASSERT_FALSE(found.empty());
+  const double excess = std::max(left_of_decays(found.front()), explained) - 1;
+  EXPECT_FALSE(search.refuted().empty());
+  for (const Trial& t : search.refuted()) {
+    EXPECT_TRUE(t.ruled_out || left_of_decays(t) - 1 > 2 * excess) << t.effects.back();
+    EXPECT_TRUE(std::none_of(found.begin(), found.end(), [&](const Trial& f) { return f.effects == t.effects; })) << t.effects.back();
+  }
+  // A diagnosis has them among what was tried.
+  DiagnoseProblem diagnosis;
+  diagnosis.rig = problem.rig;
+  diagnosis.runs = problem.runs;
+  Selection selection(diagnosis, problem, base);
+  search_laws(problem, base, base, LawSearch::Among::forms, never, selection);
+  const std::vector<Candidate> ranking = selection.ranking();
+  for (const Trial& t : search.refuted())
+    EXPECT_TRUE(std::any_of(ranking.begin(), ranking.end(), [&](const Candidate& c) { return c.effects == t.effects && c.search == SearchOutcome::ruled_out; })) << t.effects.back();
 }
 
 TEST(Dictionary, ReadsBackAsItIsWritten) {
