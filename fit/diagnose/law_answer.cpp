@@ -15,21 +15,6 @@ namespace {
 
 bool leaves_something(const Trial& t) { return what_remains(t).found; }
 
-/// Whether the runs determine no parameter of some member: what they then say is that something acts, not by which equation.
-bool is_undetermined(const FitProblem& problem, const Trial& set) {
-  FitProblem with = problem;
-  with.effects = set.effects;
-  with.rig.laws = set.arrival.joint.model().rig().laws;
-  Arrival arrival = set.arrival;
-  arrival.converged = true;  // wherever the search ended
-  const FitResult fit = describe_fit(arrival, with, Settle::nothing);
-  return std::any_of(set.effects.begin(), set.effects.end(), [&](const std::string& id) {
-    const auto is_own = [&](const FittedParameter& p) { return p.effect == id; };
-    const auto is_known = [&](const FittedParameter& p) { return is_own(p) && p.identified; };
-    return std::any_of(fit.parameters.begin(), fit.parameters.end(), is_own) && std::none_of(fit.parameters.begin(), fit.parameters.end(), is_known);
-  });
-}
-
 bool is_listed(const Trial& t) { return !is_law_id(t.effects.back()); }
 
 bool is_no_curve(const Trial& t) { return is_listed(t) || !law_of(effect(t.arrival.joint.model().rig(), t.effects.back())).is_curve(); }

@@ -12,9 +12,10 @@
 #include "core/law/law_effect.h"
 #include "core/numerics/in_parallel.h"
 #include "core/numerics/time_limit.h"
+#include "fit/diagnose/mismatch.h"
+#include "fit/fit_description.h"
 #include "fit/search/decays_first.h"
 #include "fit/search/lost_run.h"
-#include "fit/diagnose/mismatch.h"
 #include "fit/search/noise_of_trial.h"
 
 namespace unrig {
@@ -111,6 +112,20 @@ bool same_set(Strings a, Strings b) {
   std::sort(a.begin(), a.end());
   std::sort(b.begin(), b.end());
   return a == b;
+}
+
+bool is_undetermined(const FitProblem& problem, const Trial& set) {
+  FitProblem with = problem;
+  with.effects = set.effects;
+  with.rig.laws = set.arrival.joint.model().rig().laws;
+  Arrival arrival = set.arrival;
+  arrival.converged = true;  // wherever the search ended
+  const FitResult fit = describe_fit(arrival, with, Settle::nothing);
+  return std::any_of(set.effects.begin(), set.effects.end(), [&](const std::string& id) {
+    const auto is_own = [&](const FittedParameter& p) { return p.effect == id; };
+    const auto is_known = [&](const FittedParameter& p) { return is_own(p) && p.identified; };
+    return std::any_of(fit.parameters.begin(), fit.parameters.end(), is_own) && std::none_of(fit.parameters.begin(), fit.parameters.end(), is_known);
+  });
 }
 
 SearchOutcome search_of(const Trial& trial, const Trial& base) {
@@ -343,6 +358,14 @@ void Selection::try_with_all_modes(Trials& tried) {
   std::stable_partition(tried.begin(), tried.end(), plausible);
 }
 
+Trial Selection::best_determined(Trial best) const {
+  if (!what_remains(best).found || !is_undetermined(fit_problem_, best)) return best;
+  Trials others = tried_;
+  std::stable_sort(others.begin(), others.end(), [](const Trial& a, const Trial& b) { return bic_difference(a, b) < 0; });
+  const auto first = std::find_if(others.begin(), others.end(), [&](const Trial& t) { return plausible(t) && !is_undetermined(fit_problem_, t); });
+  return first == others.end() ? baseline_ : *first;
+}
+
 void Selection::stop() {
   TimeLimit::lift();
   stopped_ = true;
@@ -383,7 +406,7 @@ void Selection::grow(Trial& best, const std::function<bool(const Trial&)>& enoug
     if (best.reduced_chi2() < before) ranking_.push_back({best.effects, best.reduced_chi2(), bic_difference(best, baseline_), 0, best.score});
     if (!what_remains(best).found) break;
     if (!best.effects.empty() && enough && enough(best)) {
-      sufficient.reset();
+      sufficient = best;
       return;
     }
     if (best.effects.size() == most_effects) break;
@@ -407,7 +430,7 @@ void Selection::grow(Trial& best, const std::function<bool(const Trial&)>& enoug
 
 Trial Selection::best_set(const std::function<bool(const Trial&)>& enough, const Trial* begun) {
   Trial best = begun ? *begun : baseline_;
-  std::optional<Trial> sufficient;  // a law that is followed all but exactly: what it leaves has a name only where that leaves nothing
+  std::optional<Trial> sufficient;  // what noise or the rig's description explain the rest of; or a law that is followed all but exactly: what it leaves has a name only where that leaves nothing
   try {
     if (begun) {
       ranking_.push_back({best.effects, best.reduced_chi2(), bic_difference(best, baseline_), 0, 0});
@@ -418,6 +441,7 @@ Trial Selection::best_set(const std::function<bool(const Trial&)>& enough, const
     stop();
   }
   if (sufficient && what_remains(best).found) return *sufficient;
+  best = best_determined(std::move(best));
   return bic_difference(best, baseline_) > -decisive ? baseline_ : best;  // of lines alone
 }
 

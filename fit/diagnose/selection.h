@@ -22,6 +22,9 @@ bool in_noise_of_most(Trial& trial);
 /// Whether two sets have the same effects, in whichever order.
 bool same_set(std::vector<std::string> a, std::vector<std::string> b);
 
+/// Whether the runs determine no parameter of some member: what they then say is that something acts, not by which equation.
+bool is_undetermined(const FitProblem& problem, const Trial& set);
+
 /// How the search ended for a set with one effect more than `base`. An effect without parameters (all the modes of the rig) cannot be taken to nothing: it may leave more.
 SearchOutcome search_of(const Trial& trial, const Trial& base);
 
@@ -32,7 +35,7 @@ class Selection {
   /// Looks at all three as long as it lives.
   Selection(const DiagnoseProblem& problem, const FitProblem& fit_problem, const Trial& baseline);
 
-  /// `baseline` itself where no mismatch is found or no effect is worth it. It ends, too, with a set that leaves something where `enough` says so. `begun`: a set that was found elsewhere, from which it goes on.
+  /// `baseline` itself where no mismatch is found or no effect is worth it. Where something remains the best set of which each member is determined: another takes its share of whatever that is. It ends, too, with a set that leaves something where `enough` says so. `begun`: a set that was found elsewhere, from which it goes on.
   Trial best_set(const std::function<bool(const Trial&)>& enough = {}, const Trial* begun = nullptr);
 
   /// `other` explains everything without an effect: a law that promises less than half of what it takes beyond a set, or a signal that promises less than a quarter, does not come out ahead beside that, and is not fitted.
@@ -55,6 +58,7 @@ class Selection {
 
  private:
   Trial settled(Trial trial);
+  Trial best_determined(Trial best) const;
   void grow(Trial& best, const std::function<bool(const Trial&)>& enough, std::optional<Trial>& sufficient);
   void stop();
   void take_known_lines(Trial& best);
