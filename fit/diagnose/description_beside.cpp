@@ -24,7 +24,7 @@ Trial same_effects_beside(const RigDescription& description, const Trial& set) {
 const std::optional<RigDescription>& DescriptionBeside::explains(const Trial& set) {
   const auto known = std::find_if(looked_at_.begin(), looked_at_.end(), [&](const auto& l) { return same_set(l.first, set.effects); });
   if (known != looked_at_.end()) return known->second;
-  std::optional<RigDescription> there = describe_rig(problem_, set, enough_to_name);
+  std::optional<RigDescription> there = describe_rig(problem_, set, half_of_it);
   if (there && there->left > explained) there.reset();
   return looked_at_.emplace_back(set.effects, std::move(there)).second;
 }

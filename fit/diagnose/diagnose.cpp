@@ -16,6 +16,7 @@ Diagnosis search(const DiagnoseProblem& problem, bool numbers_known = false) {
   DiagnosisSearch search(problem, numbers_known);
   search.ask_about_noise();
   search.ask_about_description();
+  search.try_without_a_law();
   search.look_for_a_law();
   search.look_for_effects();
   search.weigh_description();

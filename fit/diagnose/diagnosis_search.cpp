@@ -175,8 +175,17 @@ bool DiagnosisSearch::is_no_law(const Trial& set) {
   return explained_by_noise(there) || (!asked_beside_ && !description_explains_ && set.reduced_chi2() < nearly_explained && description_beside_.explains(set));
 }
 
+/// A mismatch is too large for a law to explain it too where another effect does.
+void DiagnosisSearch::try_without_a_law() {
+  if (mismatch_.found && !description_explains_ && baseline_.reduced_chi2() > nearly_explained)
+    limits_.spend([&] {
+      std::optional<Trial> found = selection_->explained_without_a_law([&](const Trial& set) { return noise_or_rig_explain(set); });
+      if (!begun_) begun_ = std::move(found);  // else in the noise of a colour that it leaves
+    });
+}
+
 void DiagnosisSearch::look_for_a_law() {
-  if (may_find_laws_ && mismatch_.found && !description_explains_)
+  if (may_find_laws_ && mismatch_.found && !description_explains_ && !begun_)
     limits_.spend([&] {
       tell("looking for a law in the force that is missing");
       LawsTried searched = search_laws(fit_problem_, baseline_, baseline_, LawSearch::Among::laws_and_forms, [&](const Trial& set) { return is_no_law(set); }, *selection_);
@@ -215,7 +224,7 @@ void DiagnosisSearch::look_for_effects() {
   // Laws of the list that take most of the mismatch.
   const auto takes_most = [&](const Trial& t) { return std::none_of(t.effects.begin(), t.effects.end(), is_law_id) && t.excess() < half_of_it * baseline_.excess() && bic_difference(t, baseline_) < -decisive; };
   if (const auto first = std::find_if(laws_tried_.begin(), laws_tried_.end(), takes_most); first != laws_tried_.end()) begun_ = *first;
-  const auto enough = [&](const Trial& set) { return noise_or_rig_explain(set); };
+  const auto enough = [&](const Trial& set) { return beside_description_ || noise_or_rig_explain(set); };
   Trial best = begun_ ? *begun_ : baseline_;
   limits_.spend([&] { best = selection_->best_set(enough, begun_ ? &*begun_ : nullptr); });
   if (begun_anew_) {

@@ -29,6 +29,8 @@ class DiagnosisSearch {
   void ask_about_noise();
   /// The numbers of the files, where a step in them promises to explain the mismatch.
   void ask_about_description();
+  /// Effects without a law, where the mismatch is too large for a law to explain it as well.
+  void try_without_a_law();
   /// A law that shows in the force on the states. Where one leaves nothing, no set of effects is looked for.
   void look_for_a_law();
   /// The set of effects that explains the runs, from the laws that take most of the mismatch on; in the noise of a colour that a set leaves all over again.

@@ -24,9 +24,8 @@ bool is_no_curve(const Trial& t) { return is_listed(t) || !law_of(effect(t.arriv
 bool none_leaves_nothing(const std::vector<Trial>& tried) { return std::all_of(tried.begin(), tried.end(), leaves_something); }
 
 LawsTried search_laws(FitProblem& fit_problem, const Trial& baseline, const Trial& base, LawSearch::Among among, const LawSearch::Asked& is_no_law, Selection& selection) {
-  LawSearch search(fit_problem, base, leaves_something, is_no_law, among);
+  LawSearch search(fit_problem, base, leaves_something, is_no_law, among, base.effects.empty() ? selection.screened_alone() : std::vector<Trial>{});
   LawsTried found{search.search(), search.asked_forms()};
-  if (base.effects.empty()) selection.know(search.take_screened());
   for (const Trial& t : found.tried) selection.add({t.effects, t.reduced_chi2(), bic_difference(t, baseline), 0, 0});
   for (const Trial& t : search.refuted()) selection.add({t.effects, t.reduced_chi2(), bic_difference(t, baseline), 0, 0, SearchOutcome::ruled_out});
   return found;

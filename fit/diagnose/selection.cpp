@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <iterator>
-#include <memory>
+#include <optional>
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
@@ -121,10 +121,22 @@ bool is_undetermined(const FitProblem& problem, const Trial& set) {
   Arrival arrival = set.arrival;
   arrival.converged = true;  // wherever the search ended
   const FitResult fit = describe_fit(arrival, with, Settle::nothing);
+  const auto is_of = [&](const std::string& id, std::size_t i) { return fit.parameters[i].effect == id; };
+  // Of free decays, say, in proportion to a mass.
+  const auto is_told_with_others = [&](const std::string& id, std::size_t i) {
+    return std::any_of(fit.determined.begin(), fit.determined.end(), [&](const DeterminedCombination& c) {
+      return c.unknowns.front() == i && std::none_of(c.unknowns.begin() + 1, c.unknowns.end(), [&](std::size_t other) { return is_of(id, other); });
+    });
+  };
   return std::any_of(set.effects.begin(), set.effects.end(), [&](const std::string& id) {
-    const auto is_own = [&](const FittedParameter& p) { return p.effect == id; };
-    const auto is_known = [&](const FittedParameter& p) { return is_own(p) && p.identified; };
-    return std::any_of(fit.parameters.begin(), fit.parameters.end(), is_own) && std::none_of(fit.parameters.begin(), fit.parameters.end(), is_known);
+    bool has_any = false;
+    for (std::size_t i = 0; i < fit.parameters.size(); ++i) {
+      if (!is_of(id, i)) continue;
+      has_any = true;
+      const FittedParameter& p = fit.parameters[i];
+      if (p.std_error < std::abs(p.value) && (p.identified || is_told_with_others(id, i))) return false;
+    }
+    return has_any;
   });
 }
 
@@ -194,42 +206,42 @@ bool Selection::takes_too_little(const Trial& screened, const Trial& base) const
   return wanted > 0 && screened.score < wanted;
 }
 
+const Trials& Selection::screened_alone() {
+  if (screened_.empty()) screened_ = screened_beside(baseline_, candidates({}, {}));
+  return screened_;
+}
+
 /// Each of `ids` beside `base`.
-std::vector<std::unique_ptr<Trial>> Selection::screened_beside(const Trial& base, const Strings& ids) {
-  std::vector<std::unique_ptr<Trial>> prepared(ids.size());
-  std::vector<std::size_t> unknown;
-  for (std::size_t i = 0; i < ids.size(); ++i) {
-    const auto known = std::find_if(screened_.begin(), screened_.end(), [&](const Trial& t) { return t.effects == Strings{ids[i]}; });
-    if (base.effects.empty() && known != screened_.end()) prepared[i] = std::make_unique<Trial>(std::move(*known));
-    else unknown.push_back(i);
-  }
-  screened_.clear();
-  if (unknown.empty()) return prepared;
+Trials Selection::screened_beside(const Trial& base, const Strings& ids) const {
   const Screening screening(fit_problem_, base.arrival);
-  in_parallel(unknown.size(), [&](std::size_t k) {
+  std::vector<std::optional<Trial>> prepared(ids.size());
+  in_parallel(ids.size(), [&](std::size_t i) {
     Strings set = base.effects;
-    set.push_back(ids[unknown[k]]);
-    prepared[unknown[k]] = std::make_unique<Trial>(screened(fit_problem_, screening, base, set));
+    set.push_back(ids[i]);
+    prepared[i] = screened(fit_problem_, screening, base, set);
   });
-  return prepared;
+  Trials trials;
+  for (std::optional<Trial>& trial : prepared) trials.push_back(std::move(*trial));
+  return trials;
 }
 
 /// The best of all sets that have one effect more than `base`: all of them by one linear step, the promising ones in full.
 Trials Selection::try_one_more(const Trial& base, const Strings& hopeless) {
-  std::vector<std::unique_ptr<Trial>> prepared = screened_beside(base, candidates(base.effects, hopeless));
-  std::sort(prepared.begin(), prepared.end(), [](const auto& a, const auto& b) { return a->score > b->score; });
-  const double best_score = prepared.empty() ? 0 : prepared.front()->score;
+  Trials prepared = base.effects.empty() ? screened_alone() : screened_beside(base, candidates(base.effects, hopeless));
+  if (base.effects.empty()) std::erase_if(prepared, [&](const Trial& t) { return std::find(hopeless.begin(), hopeless.end(), t.effects.back()) != hopeless.end(); });
+  std::sort(prepared.begin(), prepared.end(), [](const Trial& a, const Trial& b) { return a.score > b.score; });
+  const double best_score = prepared.empty() ? 0 : prepared.front().score;
   Trials linear, others, unpromising;
-  for (const auto& trial : prepared) {
-    const bool promises_nothing = effect(trial->effects.back()).parameters_on(problem_.rig).empty();  // it may hold all the same
-    const bool follows_law = nonlinear(*trial), far = base.reduced_chi2() > twice_the_noise;
-    const bool promises = linear.size() + others.size() < most_refits && trial->score > quarter_of_it * best_score;
-    const bool step_says_nothing = far && best_score < half_of_it && takes_small_steps(trial->arrival.joint);  // of corners that bend a trajectory
-    if (brings_a_law(*trial) && !far && !may_be_seen(*trial, base)) continue;
-    if (!promises_nothing && takes_too_little(*trial, base)) continue;
-    if (is_first(base) && follows_law && trial->score < 0) continue;  // dear to follow; a filter, which far away promises as little, is not
-    if (prepared.size() <= few_candidates || promises_nothing || promises || step_says_nothing) (follows_law ? others : linear).push_back(std::move(*trial));
-    else if (!follows_law) unpromising.push_back(std::move(*trial));
+  for (Trial& trial : prepared) {
+    const bool promises_nothing = effect(trial.effects.back()).parameters_on(problem_.rig).empty();  // it may hold all the same
+    const bool follows_law = nonlinear(trial), far = base.reduced_chi2() > twice_the_noise;
+    const bool promises = linear.size() + others.size() < most_refits && trial.score > quarter_of_it * best_score;
+    const bool step_says_nothing = far && best_score < half_of_it && takes_small_steps(trial.arrival.joint);  // of corners that bend a trajectory
+    if (brings_a_law(trial) && !far && !may_be_seen(trial, base)) continue;
+    if (!promises_nothing && takes_too_little(trial, base)) continue;
+    if (is_first(base) && follows_law && trial.score < 0) continue;  // dear to follow; a filter, which far away promises as little, is not
+    if (prepared.size() <= few_candidates || promises_nothing || promises || step_says_nothing) (follows_law ? others : linear).push_back(std::move(trial));
+    else if (!follows_law) unpromising.push_back(std::move(trial));
   }
   // Linear effects first, which are an order faster; nonlinear ones where none of those leaves nothing, and those that promise as much.
   const double by_linear = linear.empty() ? 0 : as_much * linear.front().score;
@@ -443,6 +455,20 @@ Trial Selection::best_set(const std::function<bool(const Trial&)>& enough, const
   if (sufficient && what_remains(best).found) return *sufficient;
   best = best_determined(std::move(best));
   return bic_difference(best, baseline_) > -decisive ? baseline_ : best;  // of lines alone
+}
+
+std::optional<Trial> Selection::explained_without_a_law(const std::function<bool(const Trial&)>& enough) {
+  tell("trying what may be missing, without a law");
+  double most = 0;
+  for (const Trial& t : screened_alone()) most = std::max(most, t.score);
+  Trials linear;
+  std::copy_if(screened_alone().begin(), screened_alone().end(), std::back_inserter(linear), [&](const Trial& t) { return t.score > quarter_of_it * most && !nonlinear(t); });
+  fit_linear(linear);
+  keep_distinct(linear);
+  std::erase_if(linear, [](const Trial& t) { return t.reduced_chi2() > nearly_explained || !plausible(t); });
+  const auto first = std::find_if(linear.begin(), linear.end(), [&](const Trial& t) { return !what_remains(t).found || enough(t); });
+  if (first == linear.end()) return std::nullopt;
+  return std::move(*first);
 }
 
 /// Probabilities: exp(-BIC/2) over the sum of it over all.

@@ -22,7 +22,7 @@ bool in_noise_of_most(Trial& trial);
 /// Whether two sets have the same effects, in whichever order.
 bool same_set(std::vector<std::string> a, std::vector<std::string> b);
 
-/// Whether the runs determine no parameter of some member: what they then say is that something acts, not by which equation.
+/// Whether the runs determine no parameter of some member, not even to within its own size: what they then say is that something acts, not by which equation.
 bool is_undetermined(const FitProblem& problem, const Trial& set);
 
 /// How the search ended for a set with one effect more than `base`. An effect without parameters (all the modes of the rig) cannot be taken to nothing: it may leave more.
@@ -38,14 +38,17 @@ class Selection {
   /// `baseline` itself where no mismatch is found or no effect is worth it. Where something remains the best set of which each member is determined: another takes its share of whatever that is. It ends, too, with a set that leaves something where `enough` says so. `begun`: a set that was found elsewhere, from which it goes on.
   Trial best_set(const std::function<bool(const Trial&)>& enough = {}, const Trial* begun = nullptr);
 
+  /// Of effects without a law, which are fitted in a hundredth of the work, the one that leaves nothing by itself, or something that `enough` says is explained.
+  std::optional<Trial> explained_without_a_law(const std::function<bool(const Trial&)>& enough);
+
   /// `other` explains everything without an effect: a law that promises less than half of what it takes beyond a set, or a signal that promises less than a quarter, does not come out ahead beside that, and is not fitted.
   void hold_against(const Trial& other) { held_against_ = other.variance; }
 
   /// `best`, or what explains the runs better with another effect of the list in place of a member: each is challenged by those that were not fitted and promise half of what it takes.
   Trial challenged(Trial best);
 
-  /// Effects as they were screened beside the baseline elsewhere, each by itself.
-  void know(std::vector<Trial> screened) { screened_ = std::move(screened); }
+  /// Effects that can act in these runs as one linear step from the baseline has them, each by itself.
+  const std::vector<Trial>& screened_alone();
 
   /// Whether the search ended because its time was up (core/numerics/time_limit.h), which is lifted then.
   bool stopped() const { return stopped_; }
@@ -65,7 +68,7 @@ class Selection {
   /// Whether nothing has been found beside them.
   bool is_first(const Trial& base) const { return base.effects.size() == lines_.size(); }
   std::vector<std::string> candidates(const std::vector<std::string>& at_work, const std::vector<std::string>& hopeless) const;
-  std::vector<std::unique_ptr<Trial>> screened_beside(const Trial& base, const std::vector<std::string>& ids);
+  std::vector<Trial> screened_beside(const Trial& base, const std::vector<std::string>& ids) const;
   std::vector<Trial> try_one_more(const Trial& base, const std::vector<std::string>& hopeless);
   Trial without_superfluous(Trial trial);
   void try_with_all_modes(std::vector<Trial>& tried);

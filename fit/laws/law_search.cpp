@@ -69,8 +69,8 @@ Eigen::VectorXd start_of(Form form, const BesideUnknownForces& beside) {
 
 }  // namespace
 
-LawSearch::LawSearch(FitProblem& problem, const Trial& base, Asked leaves_something, Asked is_no_law, Among among)
-    : problem_(problem), base_(base), leaves_something_(std::move(leaves_something)), is_no_law_(std::move(is_no_law)), among_(among) {}
+LawSearch::LawSearch(FitProblem& problem, const Trial& base, Asked leaves_something, Asked is_no_law, Among among, std::vector<Trial> screened)
+    : problem_(problem), base_(base), leaves_something_(std::move(leaves_something)), is_no_law_(std::move(is_no_law)), among_(among), screened_(std::move(screened)) {}
 
 /// What `which` of the forms promise to first order at the best of their starts, where they stand then; -inf for those at work and for all others. The rig gets these.
 std::vector<double> LawSearch::screen_forms(const Trial& base, const Screening& screening, std::vector<Form>& forms, const std::vector<std::size_t>& which) {
@@ -199,13 +199,21 @@ std::vector<std::string> LawSearch::of_the_list(const Trial& base) const {
 
 /// Each of `ids` beside `base`.
 std::vector<Trial> LawSearch::screened_beside(const Trial& base, const std::vector<std::string>& ids) const {
-  const Screening screening(problem_, base.arrival);
   std::vector<std::optional<Trial>> trials(ids.size());
-  in_parallel(ids.size(), [&](std::size_t i) {
-    std::vector<std::string> set = base.effects;
-    set.push_back(ids[i]);
-    trials[i] = screened(problem_, screening, base, set);
-  });
+  std::vector<std::size_t> unknown;
+  for (std::size_t i = 0; i < ids.size(); ++i) {
+    const auto known = std::find_if(screened_.begin(), screened_.end(), [&](const Trial& t) { return t.effects.back() == ids[i]; });
+    if (&base == &base_ && known != screened_.end()) trials[i] = *known;
+    else unknown.push_back(i);
+  }
+  if (!unknown.empty()) {
+    const Screening screening(problem_, base.arrival);
+    in_parallel(unknown.size(), [&](std::size_t k) {
+      std::vector<std::string> set = base.effects;
+      set.push_back(ids[unknown[k]]);
+      trials[unknown[k]] = screened(problem_, screening, base, set);
+    });
+  }
   std::vector<Trial> screened;
   for (std::optional<Trial>& trial : trials) screened.push_back(std::move(*trial));
   return screened;
@@ -423,8 +431,7 @@ void LawSearch::try_the_first_two() {
 void LawSearch::follow_the_list() {
   std::vector<std::string> ids = of_the_list(base_);
   std::erase_if(ids, [&](const std::string& id) { return std::any_of(asked_.begin(), asked_.end(), [&](const AskedFor& a) { return a.form.listed == id; }); });
-  screened_ = screened_beside(base_, ids);
-  Prospects laws = prospects(base_, screened_, {});
+  Prospects laws = prospects(base_, screened_beside(base_, ids), {});
   promised_ = laws.promised;
   in_order_of_parameters(laws.laws);
   try_all(std::move(laws.laws), base_);

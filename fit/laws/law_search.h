@@ -38,13 +38,11 @@ class LawSearch {
 
   using Asked = std::function<bool(const Trial&)>;
   /// `problem` lives as long as what is found, and its rig gets the laws that are tried. `leaves_something`: whether a fit does; `is_no_law`: whether
-  /// noise of a colour explains that, or the rig's description.
-  LawSearch(FitProblem& problem, const Trial& base, Asked leaves_something, Asked is_no_law, Among among);
+  /// noise of a colour explains that, or the rig's description. `screened`: effects of the list beside `base` where they were screened before, each by itself.
+  LawSearch(FitProblem& problem, const Trial& base, Asked leaves_something, Asked is_no_law, Among among, std::vector<Trial> screened = {});
 
   /// All sets that were fitted in full, `base` with one law more or two, the best first; empty where no form explains anything. Where the limits of the search are reached, those that were followed by then.
   std::vector<Trial> search();
-  /// Effects of the list as they were screened beside `base`, each by itself; none where the list was not asked.
-  std::vector<Trial> take_screened() { return std::move(screened_); }
   /// Those that the free decays speak against: they were followed no further.
   const std::vector<Trial>& refuted() const { return refuted_; }
   /// Whether forms of the dictionary were looked for beside `base`.
@@ -104,8 +102,9 @@ class LawSearch {
   const Trial& base_;
   Asked leaves_something_, is_no_law_;
   Among among_;
+  std::vector<Trial> screened_;  // beside the base
   std::vector<Trial> found_;  // all that were followed, the best first
-  std::vector<Trial> refuted_, screened_;
+  std::vector<Trial> refuted_;
   std::vector<AskedFor> asked_;  // by the decays, the most evident first
   std::vector<Trial> dear_;      // laws that are followed in small steps, behind all others of the list
   Promised promised_;

@@ -11,6 +11,7 @@
 #include <nlohmann/json.hpp>
 
 #include "core/rig/givens.h"
+#include "fit/diagnose/description_beside.h"
 #include "fit/diagnose/diagnosis_files.h"
 #include "fit/diagnose/selection.h"
 #include "tests/support/sample_data.h"
@@ -86,6 +87,21 @@ TEST(RigDescription, IsFoundInNoiseOfAColour) {
   EXPECT_TRUE(has_colour(description->from->arrival.joint));
   EXPECT_FALSE(what_remains(description->trial).found);
   EXPECT_LT(bic_difference(description->trial, *description->from) + description->cost, -decisive);
+}
+
+/// Numbers that are far off are found in many steps, of which the first promises most of what the wave leaves, and not all.
+TEST(DescriptionBeside, IsSearchedWhereAStepPromisesMostOfWhatASetLeaves) {
+  DiagnoseProblem problem = campaign("wave");
+  problem.rig.normal.inertia[12] *= 1.3;
+  const FitProblem fit = fit_of(problem);
+  Trial wave = prepare(fit, baseline_of(fit), {"tank-wave"});
+  fit_fully(wave, 6);
+  ASSERT_GT(wave.reduced_chi2(), 2);
+  DescriptionBeside beside(problem);
+  const std::optional<RigDescription>& description = beside.explains(wave);
+  ASSERT_TRUE(description);
+  EXPECT_LT(description->promised, enough_to_name);
+  EXPECT_LT(description->left, explained);
 }
 
 TEST(RigDescription, DoesNotExplainAFilterInTheGauge) {

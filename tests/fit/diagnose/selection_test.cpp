@@ -11,6 +11,7 @@
 #include "fit/diagnose/diagnose.h"
 #include "fit/diagnose/selection.h"
 #include "fit/trial/trial_campaign.h"
+#include "tests/fit/laws/two_decays.h"
 #include "tests/support/long_tests.h"
 #include "tests/support/sample_data.h"
 #include "tests/support/shared_data.h"
@@ -71,6 +72,50 @@ class LongSelection : public testing::Test {
     if (!test::long_tests_wanted()) GTEST_SKIP() << "takes minutes; UNRIG_LONG=1 asks for it";
   }
 };
+
+/// A campaign of sample_data, fitted with nothing missing.
+struct Fitted {
+  explicit Fitted(const std::string& name) : Fitted(problem_of(name)) {}
+  explicit Fitted(FitProblem of) : fit(std::move(of)), baseline(fit_baseline(fit)) {
+    problem.rig = fit.rig;
+    problem.runs = fit.runs;
+  }
+  static FitProblem problem_of(const std::string& name) {
+    const std::string folder = test::source_path("sample_data/campaigns/" + name + "/");
+    FitProblem fit;
+    fit.rig = read_rig(folder + "rig.toml");
+    for (const char* run : {"dry_pluck", "wet_pluck", "step_a", "step_b", "step_c"}) fit.runs.push_back(read_run(folder + run + ".csv"));
+    return fit;
+  }
+  DiagnoseProblem problem;
+  FitProblem fit;
+  Trial baseline;
+};
+
+TEST(Selection, AnEffectWithoutALawIsFoundByItselfWhereItExplainsTheRuns) {
+  const auto never = [](const Trial&) { return false; };
+  const Fitted wave("wave"), friction("friction");
+  const std::optional<Trial> found = Selection(wave.problem, wave.fit, wave.baseline).explained_without_a_law(never);
+  ASSERT_TRUE(found);
+  EXPECT_EQ(found->effects, Strings{"tank-wave"});
+  EXPECT_FALSE(what_remains(*found).found);
+  EXPECT_FALSE(Selection(friction.problem, friction.fit, friction.baseline).explained_without_a_law(never));
+}
+
+/// Within its yield displacement hysteresis is a spring, as the rig is one: no reading tells how large its force could get.
+TEST(Selection, AnEffectIsUndeterminedWhereTheRunsTellNothingOfIt) {
+  const FitProblem problem = two_decays::problem([](double x, double) { return -0.08 * two_decays::stiffness * x * x * x; });
+  const Trial base = fit_baseline(problem);
+  Trial spring = prepare(problem, base, {"cubic-stiffness"});
+  ASSERT_TRUE(fit_decays_first(spring, base));
+  fit_fully(spring, 6);
+  EXPECT_FALSE(is_undetermined(problem, spring));
+  Trial elastic = prepare(problem, spring, {"cubic-stiffness", "bouc-wen"});
+  for (Unknown& u : elastic.arrival.joint.unknowns())
+    if (const Parameter& p = elastic.arrival.joint.parameter(u); p.name == "bouc-wen.yield_displacement") u.value = p.upper;
+    else if (p.name == "bouc-wen.force") u.value = 1;
+  EXPECT_TRUE(is_undetermined(problem, elastic));
+}
 
 /// A drag and a spring of much the same size. A wave with an amplitude for every run comes first, and the spring beside it leaves little; only in the wave's place does the drag come in.
 TEST_F(LongSelection, TheFirstToBeFoundIsExchangedForWhatItStoodInFor) {
