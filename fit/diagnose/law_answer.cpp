@@ -21,6 +21,32 @@ bool is_no_curve(const Trial& t) { return is_listed(t) || !law_of(effect(t.arriv
 
 }  // namespace
 
+bool is_undetermined(const FitProblem& problem, const Trial& set) {
+  FitProblem with = problem;
+  with.effects = set.effects;
+  with.rig.laws = set.arrival.joint.model().rig().laws;
+  Arrival arrival = set.arrival;
+  arrival.converged = true;  // wherever the search ended
+  const FitResult fit = describe_fit(arrival, with, Settle::nothing);
+  const auto is_of = [&](const std::string& id, std::size_t i) { return fit.parameters[i].effect == id; };
+  // Of free decays, say, in proportion to a mass.
+  const auto is_told_with_others = [&](const std::string& id, std::size_t i) {
+    return std::any_of(fit.determined.begin(), fit.determined.end(), [&](const DeterminedCombination& c) {
+      return c.unknowns.front() == i && std::none_of(c.unknowns.begin() + 1, c.unknowns.end(), [&](std::size_t other) { return is_of(id, other); });
+    });
+  };
+  return std::any_of(set.effects.begin(), set.effects.end(), [&](const std::string& id) {
+    bool has_any = false;
+    for (std::size_t i = 0; i < fit.parameters.size(); ++i) {
+      if (!is_of(id, i)) continue;
+      has_any = true;
+      const FittedParameter& p = fit.parameters[i];
+      if (p.std_error < std::abs(p.value) && (p.identified || is_told_with_others(id, i))) return false;
+    }
+    return has_any;
+  });
+}
+
 bool none_leaves_nothing(const std::vector<Trial>& tried) { return std::all_of(tried.begin(), tried.end(), leaves_something); }
 
 LawsTried search_laws(FitProblem& fit_problem, const Trial& baseline, const Trial& base, LawSearch::Among among, const LawSearch::Asked& is_no_law, Selection& selection) {

@@ -14,6 +14,9 @@ struct Laws {
   std::vector<Rival> rivals;
 };
 
+/// Whether the runs determine no parameter of some member, not even to within its own size: what they then say is that something acts, not by which equation.
+bool is_undetermined(const FitProblem& problem, const Trial& set);
+
 /// Whether none of these leaves nothing that is significant.
 bool none_leaves_nothing(const std::vector<Trial>& tried);
 

@@ -13,7 +13,6 @@
 #include "core/numerics/in_parallel.h"
 #include "core/numerics/time_limit.h"
 #include "fit/diagnose/mismatch.h"
-#include "fit/fit_description.h"
 #include "fit/search/decays_first.h"
 #include "fit/search/lost_run.h"
 #include "fit/search/noise_of_trial.h"
@@ -112,32 +111,6 @@ bool same_set(Strings a, Strings b) {
   std::sort(a.begin(), a.end());
   std::sort(b.begin(), b.end());
   return a == b;
-}
-
-bool is_undetermined(const FitProblem& problem, const Trial& set) {
-  FitProblem with = problem;
-  with.effects = set.effects;
-  with.rig.laws = set.arrival.joint.model().rig().laws;
-  Arrival arrival = set.arrival;
-  arrival.converged = true;  // wherever the search ended
-  const FitResult fit = describe_fit(arrival, with, Settle::nothing);
-  const auto is_of = [&](const std::string& id, std::size_t i) { return fit.parameters[i].effect == id; };
-  // Of free decays, say, in proportion to a mass.
-  const auto is_told_with_others = [&](const std::string& id, std::size_t i) {
-    return std::any_of(fit.determined.begin(), fit.determined.end(), [&](const DeterminedCombination& c) {
-      return c.unknowns.front() == i && std::none_of(c.unknowns.begin() + 1, c.unknowns.end(), [&](std::size_t other) { return is_of(id, other); });
-    });
-  };
-  return std::any_of(set.effects.begin(), set.effects.end(), [&](const std::string& id) {
-    bool has_any = false;
-    for (std::size_t i = 0; i < fit.parameters.size(); ++i) {
-      if (!is_of(id, i)) continue;
-      has_any = true;
-      const FittedParameter& p = fit.parameters[i];
-      if (p.std_error < std::abs(p.value) && (p.identified || is_told_with_others(id, i))) return false;
-    }
-    return has_any;
-  });
 }
 
 SearchOutcome search_of(const Trial& trial, const Trial& base) {
@@ -370,14 +343,6 @@ void Selection::try_with_all_modes(Trials& tried) {
   std::stable_partition(tried.begin(), tried.end(), plausible);
 }
 
-Trial Selection::best_determined(Trial best) const {
-  if (!what_remains(best).found || !is_undetermined(fit_problem_, best)) return best;
-  Trials others = tried_;
-  std::stable_sort(others.begin(), others.end(), [](const Trial& a, const Trial& b) { return bic_difference(a, b) < 0; });
-  const auto first = std::find_if(others.begin(), others.end(), [&](const Trial& t) { return plausible(t) && !is_undetermined(fit_problem_, t); });
-  return first == others.end() ? baseline_ : *first;
-}
-
 void Selection::stop() {
   TimeLimit::lift();
   stopped_ = true;
@@ -453,7 +418,6 @@ Trial Selection::best_set(const std::function<bool(const Trial&)>& enough, const
     stop();
   }
   if (sufficient && what_remains(best).found) return *sufficient;
-  best = best_determined(std::move(best));
   return bic_difference(best, baseline_) > -decisive ? baseline_ : best;  // of lines alone
 }
 

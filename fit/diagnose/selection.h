@@ -22,9 +22,6 @@ bool in_noise_of_most(Trial& trial);
 /// Whether two sets have the same effects, in whichever order.
 bool same_set(std::vector<std::string> a, std::vector<std::string> b);
 
-/// Whether the runs determine no parameter of some member, not even to within its own size: what they then say is that something acts, not by which equation.
-bool is_undetermined(const FitProblem& problem, const Trial& set);
-
 /// How the search ended for a set with one effect more than `base`. An effect without parameters (all the modes of the rig) cannot be taken to nothing: it may leave more.
 SearchOutcome search_of(const Trial& trial, const Trial& base);
 
@@ -35,7 +32,7 @@ class Selection {
   /// Looks at all three as long as it lives.
   Selection(const DiagnoseProblem& problem, const FitProblem& fit_problem, const Trial& baseline);
 
-  /// `baseline` itself where no mismatch is found or no effect is worth it. Where something remains the best set of which each member is determined: another takes its share of whatever that is. It ends, too, with a set that leaves something where `enough` says so. `begun`: a set that was found elsewhere, from which it goes on.
+  /// `baseline` itself where no mismatch is found or no effect is worth it. It ends, too, with a set that leaves something where `enough` says so. `begun`: a set that was found elsewhere, from which it goes on.
   Trial best_set(const std::function<bool(const Trial&)>& enough = {}, const Trial* begun = nullptr);
 
   /// Of effects without a law, which are fitted in a hundredth of the work, the one that leaves nothing by itself, or something that `enough` says is explained.
@@ -61,7 +58,6 @@ class Selection {
 
  private:
   Trial settled(Trial trial);
-  Trial best_determined(Trial best) const;
   void grow(Trial& best, const std::function<bool(const Trial&)>& enough, std::optional<Trial>& sufficient);
   void stop();
   void take_known_lines(Trial& best);

@@ -9,6 +9,7 @@
 
 #include "core/model/simulate.h"
 #include "fit/diagnose/diagnose.h"
+#include "fit/diagnose/law_answer.h"
 #include "fit/diagnose/selection.h"
 #include "fit/trial/trial_campaign.h"
 #include "tests/fit/laws/two_decays.h"
@@ -103,7 +104,7 @@ TEST(Selection, AnEffectWithoutALawIsFoundByItselfWhereItExplainsTheRuns) {
 }
 
 /// Within its yield displacement hysteresis is a spring, as the rig is one: no reading tells how large its force could get.
-TEST(Selection, AnEffectIsUndeterminedWhereTheRunsTellNothingOfIt) {
+TEST(LawAnswer, AnEffectIsUndeterminedWhereTheRunsTellNothingOfIt) {
   const FitProblem problem = two_decays::problem([](double x, double) { return -0.08 * two_decays::stiffness * x * x * x; });
   const Trial base = fit_baseline(problem);
   Trial spring = prepare(problem, base, {"cubic-stiffness"});
