@@ -33,9 +33,11 @@ std::vector<Interval> stretches_of(const VectorXd& residual) {
   return stretches;
 }
 
+constexpr double apart = 4;  // corners
+
 /// Corners a factor of four apart, from an eighth of the sampling rate down to what the longest stretch still tells from a constant.
 VectorXd corners_for(double rate, double duration) {
-  constexpr double apart = 4, slowest = 0.5;  // periods of the corner in the stretch
+  constexpr double slowest = 0.5;  // periods of the corner in the stretch
   std::vector<double> corners;
   for (double corner = rate / 8; corner * duration > slowest; corner /= apart) corners.push_back(corner);
   return Eigen::Map<const VectorXd>(corners.data(), static_cast<Index>(corners.size()));
@@ -215,6 +217,17 @@ NoiseColour colour_from(const VectorXd& corner, const VectorXd& powers, double d
   return colour;
 }
 
+/// With a part slower than the stretches tell from a constant: noise that rises as far down as one can see goes on rising. The slowest that they tell has taken some of it for its own.
+NoiseColour going_on(NoiseColour colour) {
+  constexpr double share = 0.5;  // of the power of that: means over the parts of a record of 1/f noise then differ as they should, within a tenth
+  const Index told = colour.corner.size();
+  colour.corner.conservativeResize(told + 1);
+  colour.power.conservativeResize(told + 1);
+  colour.corner[told] = colour.corner[told - 1] / apart;
+  colour.power[told] = share * colour.power[told - 1];
+  return colour;
+}
+
 struct Longest {
   double duration = 0, dt = 0;
 };
@@ -260,7 +273,7 @@ std::optional<CommonColour> colour_in_common(const std::vector<RestResidual>& re
   const double gained = log_likelihood(with_falling) - (any ? log_likelihood(powers) : of_white);
   if (is_more(gained, any ? all - correlated : all)) powers = with_falling;
   else if (!any) return std::nullopt;
-  CommonColour common{colour_from(corner, powers, longest.dt)};
+  CommonColour common{going_on(colour_from(corner, powers, longest.dt))};
   const double chance = 1e-3 / (2 * static_cast<double>(stretches.size()));  // Bonferroni: of two tests each
   for (std::size_t i = 0; i < stretches.size(); ++i)
     if (const double far = far_from_white(stretches[i].power.cwiseQuotient(stretches[i].basis * powers), chance); far > common.farthest) common.farthest = far, common.which = owner[i];

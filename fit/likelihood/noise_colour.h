@@ -12,7 +12,7 @@ namespace unrig {
 ///
 ///   n_{k+1} = a n_k + v_k,  a = exp(-2 pi f dt),   spectrum  c (1 - a^2) / (1 - 2 a cos omega + a^2)  at omega radians per sample.
 ///
-/// Few of them make 1/f noise over the decades of a record (one in each decade: M. S. Keshner, Proc. IEEE 70 (1982) 212). Beside them, falling parts: noise that a filter against aliasing has
+/// Few of them make 1/f noise over the decades of a record, and one below (one in each decade: M. S. Keshner, Proc. IEEE 70 (1982) 212, where no lowest frequency is seen). Beside them, falling parts: noise that a filter against aliasing has
 /// kept from the end of the spectrum, white noise through a Butterworth filter of first order,
 ///
 ///   m_{k+1} = b m_k + u_{k+1} + u_k,  b = (1 - tan(pi f dt)) / (1 + tan(pi f dt)),   spectrum  c (1 - b) (1 + cos omega) / (1 - 2 b cos omega + b^2).

@@ -164,6 +164,43 @@ TEST(NoiseColour, IsFoundWithItsSize) {
   }
 }
 
+/// 1/f noise has no lowest frequency. The mean of a record's first sixth says less of that of its second half than parts do that a record tells from a constant.
+TEST(NoiseColour, OfOneOverFGoesOnBelowTheRecord) {
+  constexpr Index samples = 2000, first = samples / 6, last = samples / 2;
+  constexpr unsigned trials = 60, runs = 5;
+  NoiseColour truth{VectorXd(36), VectorXd::Constant(36, 1.0 / 36), 0.3};
+  for (Index i = 0; i < 36; ++i) truth.corner[i] = 0.5 / dt / std::pow(10, static_cast<double>(i) / 8);  // eight to a decade, down to a thousandth of a hertz
+  VectorXd weight = VectorXd::Zero(samples);
+  weight.head(first).setConstant(-1.0 / first);
+  weight.tail(last).setConstant(1.0 / last);
+  VectorXd in_common(samples);  // of the weights, lag by lag
+  for (Index lag = 0; lag < samples; ++lag) in_common[lag] = weight.head(samples - lag).dot(weight.tail(samples - lag));
+  const auto expected = [&](const NoiseColour& colour) {
+    double sum = colour.white * in_common[0];
+    for (Index i = 0; i < colour.corner.size(); ++i) {
+      const double pole = std::exp(-2 * std::numbers::pi * colour.corner[i] * dt);
+      double correlation = colour.power[i], part = correlation * in_common[0];
+      for (Index lag = 1; lag < samples; ++lag) part += 2 * (correlation *= pole) * in_common[lag];
+      sum += part;
+    }
+    return sum;
+  };
+  double told = 0;
+  unsigned found = 0;
+  for (unsigned seed = 0; seed < trials; ++seed) {
+    std::vector<RestResidual> residuals;
+    for (unsigned r = 0; r < runs; ++r) residuals.push_back({noise_of(truth, samples, 100 * seed + r), dt});
+    const std::optional<NoiseColour> colour = colour_of(residuals);
+    if (!colour) continue;
+    found += 1;
+    told += expected(*colour);
+  }
+  ASSERT_GT(found, trials * 9 / 10);
+  const double ratio = told / found / expected(truth);
+  EXPECT_GT(ratio, 0.95) << "0.85 with what the records tell alone";
+  EXPECT_LT(ratio, 1.25) << "three hundred records tell it to 8 %, in fourfold steps";
+}
+
 TEST(NoiseColour, BehindAFilterAgainstAliasingIsFound) {
   constexpr Index samples = 8192, lines = 401;
   for (const unsigned seed : {1u, 2u, 3u, 4u}) {
