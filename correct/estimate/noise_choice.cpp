@@ -16,9 +16,10 @@ bool any(const Colours& colours) {
   return std::any_of(colours.begin(), colours.end(), [](const auto& colour) { return colour.has_value(); });
 }
 
+/// The slowest power follows from the one before it.
 double cost_of(const Colours& colours, Index readings) {
   Index powers = 0;
-  for (const auto& colour : colours) powers += colour ? colour->power.size() : 0;
+  for (const auto& colour : colours) powers += colour ? colour->power.size() - 1 : 0;
   return static_cast<double>(powers) * std::log(static_cast<double>(readings));
 }
 
