@@ -63,10 +63,10 @@ TEST(Work, EndsTheSearchAtTheSameStepHoweverManyThreadsThereAre) {
   const std::string path = directory.path("diagnosis.json");
   std::string first;
   for (const std::string threads : {"1", "3"}) {
-    const Finished finished = diagnose(directory, "wave", {"--work", "12", "--limit", "inf", "--threads", threads});
+    const Finished finished = diagnose(directory, "wave", {"--work", "6", "--limit", "inf", "--threads", threads});
     const json result = json::parse(read_text(path));
     EXPECT_EQ(result["stopped"], true) << finished.err;
-    EXPECT_GT(result["work"], 12);
+    EXPECT_GT(result["work"], 6);
     EXPECT_GT(result["ranking"].size(), 1u) << "what was tried by then is told";
     if (first.empty()) first = read_text(path);
     else EXPECT_EQ(first, read_text(path));
