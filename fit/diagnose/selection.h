@@ -35,7 +35,7 @@ class Selection {
   /// `baseline` itself where no mismatch is found or no effect is worth it. It ends, too, with a set that leaves something where `enough` says so. `begun`: a set that was found elsewhere, from which it goes on.
   Trial best_set(const std::function<bool(const Trial&)>& enough = {}, const Trial* begun = nullptr);
 
-  /// Of effects without a law, which are fitted in a hundredth of the work, the one that leaves nothing by itself, or something that `enough` says is explained.
+  /// Of effects without a law, which are fitted in a tenth to a hundredth of the work, the one that leaves nothing by itself, or something that `enough` says is explained.
   std::optional<Trial> explained_without_a_law(const std::function<bool(const Trial&)>& enough);
 
   /// `other` explains everything without an effect: a law that promises less than half of what it takes beyond a set, or a signal that promises less than a quarter, does not come out ahead beside that, and is not fitted.
