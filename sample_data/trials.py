@@ -2,6 +2,7 @@
 """The results of several `unrig trial` as one table.
 
   python3 sample_data/trials.py trial_1.json trial_2.json ... > TRIAL.md
+  python3 sample_data/trials.py CASES > TRIAL.md        # the folder of `unrig trial --cases`: what is there of a study that has not come to its end
 
 Size: r.m.s. of what the hidden effect does to the run that it changes most, over the noise; of two, each beside the bare rig, the smaller one. Right: exactly what was hidden was named, or nothing where nothing
 was. As good: another set was named and the hidden one was reported with it, as one that these recordings cannot tell from it.
@@ -68,6 +69,26 @@ def well_held(trial):
     return ratio is not None and ratio <= 1.2
 
 
+def held(trial):
+    """Whether the set of explanations holds what is true; `something-else` is none of the others."""
+    hidden = sorted(trial["hidden"])
+    alike = [sorted(one) for one in trial["explanations"]]
+    return hidden in alike or sorted([*hidden, "rig-description"]) in alike or (bool(hidden) and ["something-else"] in alike) or trial["right"]
+
+
+def seeds(results):
+    return ", ".join(sorted({str(r.get("seed", "as called")) for r in results}))
+
+
+def read(name):
+    """A result, or the cases of a study."""
+    path = pathlib.Path(name)
+    if not path.is_dir():
+        return json.loads(path.read_text())
+    trials = [json.loads(case.read_text()) for case in path.rglob("*.json")]
+    return {"trials": sorted(trials, key=lambda t: t["trial"]), **({"laws": []} if any("law" in t for t in trials) else {})}
+
+
 def print_laws(results):
     """The table of `unrig trial --law`."""
     trials = [t for r in results for t in r["trials"]]
@@ -75,7 +96,7 @@ def print_laws(results):
     inside, outside = [t for t in laws if not t["law"]["outside"]], [t for t in laws if t["law"]["outside"]]
     decided = [t for t in laws if (t["law"]["exact_ahead"] or 0) >= 10]
     named = sorted(t["law"]["rivals"] for t in inside if t["law"]["named"])
-    print(f"{len(trials)} campaigns (seeds {', '.join(sorted({str(r['seed']) for r in results}))}), {sum('failure' in t for t in trials)} failed\n")
+    print(f"{len(trials)} campaigns (seeds {seeds(results)}), {sum('failure' in t for t in trials)} failed\n")
     if inside:
         clear = [t for t in decided if t in inside]
         print(f"- of the dictionary, an exact model ahead by 10 or more in twice the log likelihood: {share(len(clear), len(inside))}; of these right or among the rivals {share(sum(of_law(t) in ('right', 'among rivals') for t in clear), len(clear))}")
@@ -101,15 +122,15 @@ def print_laws(results):
 
 
 def main():
-    results = [json.loads(pathlib.Path(name).read_text()) for name in sys.argv[1:]]
+    results = [read(name) for name in sys.argv[1:]]
     if any("laws" in r for r in results):
         return print_laws(results)
     trials = [t for r in results for t in r["trials"]]
     nulls, hidden = [t for t in trials if not t["hidden"]], [t for t in trials if t["hidden"]]
     visible = [t for t in hidden if size(t) >= VISIBLE]
     kinds = collections.Counter(kind(t) for t in visible)
-    noise = sorted({f"{r['noise']['gauge']:.3g} {r['noise']['unit']}" for r in results})
-    print(f"{len(trials)} campaigns (seeds {', '.join(str(r['seed']) for r in results)}), noise {', '.join(noise)}\n")
+    noise = sorted({f"{r['noise']['gauge']:.3g} {r['noise']['unit']}" if "noise" in r else "as called" for r in results})
+    print(f"{len(trials)} campaigns (seeds {seeds(results)}), noise {', '.join(noise)}\n")
     print(f"- nothing hidden: {share(sum(not t['right'] or t['unexplained'] for t in nulls), len(nulls))} false alarms")
     print(f"- something hidden, size {VISIBLE} or more: " + "; ".join(f"{k} {share(kinds[k], len(visible))}" for k in ("right", "as good", "one of two", "wrong", "unexplained", "missed", "failed") if kinds[k]))
     seconds = sorted(t["seconds"] for t in trials)
@@ -133,12 +154,18 @@ def main():
             print(f"| {name} | {len(own)} | {sum(count.values())} | " + " | ".join(str(count[c]) for c in columns) + " |")
     stated = sorted((t["probability"], t["right"]) for t in trials if t["probability"] is not None)
     if stated:
+        off = 0
         print("\n| stated probability | campaigns | in the mean | right |\n| --- | --- | --- | --- |")
         for low, high in zip(STATED, STATED[1:]):
             own = [(p, right) for p, right in stated if low <= p < high or p == high == 1]
             if own:
+                off += abs(sum(p for p, _ in own) - sum(right for _, right in own)) / len(stated)
                 print(f"| {low:g} to {high:g} | {len(own)} | {sum(p for p, _ in own) / len(own):.3f} | {sum(right for _, right in own)} |")
-        print(f"\nBrier score {sum((p - right) ** 2 for p, right in stated) / len(stated):.3f}.")
+        print(f"\nCalibration error, weighted by count, {off:.3f}; Brier score {sum((p - right) ** 2 for p, right in stated) / len(stated):.3f}.")
+    sets = [t for t in trials if t.get("explanations")]
+    if sets:
+        seen = [t for t in sets if not t["hidden"] or size(t) >= VISIBLE]
+        print(f"\nThe set of explanations holds the truth in {share(sum(map(held, sets)), len(sets))}, where nothing is hidden or size {VISIBLE} or more in {share(sum(map(held, seen)), len(seen))}; {statistics.mean(len(t['explanations']) for t in sets):.2f} members on the mean.")
     print("\n| size | campaigns | " + " | ".join(columns) + " |\n" + "| --- " * (len(columns) + 2) + "|")
     for low, high in zip(BINS, BINS[1:]):
         own = [t for t in hidden if low <= size(t) < high]

@@ -175,22 +175,29 @@ bool DiagnosisSearch::is_no_law(const Trial& set) {
   return explained_by_noise(there) || (!asked_beside_ && !description_explains_ && set.reduced_chi2() < nearly_explained && description_beside_.explains(set));
 }
 
+/// Whether an effect without a law explains the runs, from which the search for effects begins then. `promising`: one that promises much to first order, or another.
+bool DiagnosisSearch::begin_without_a_law(bool promising) {
+  std::optional<Trial> found = selection_->explained_without_a_law([&](const Trial& set) { return noise_or_rig_explain(set); }, promising);
+  if (!begun_) begun_ = std::move(found);  // else in the noise of a colour that it leaves
+  return begun_.has_value();
+}
+
 /// A mismatch is too large for a law to explain it too where another effect does.
 void DiagnosisSearch::try_without_a_law() {
   if (mismatch_.found && !description_explains_ && baseline_.reduced_chi2() > nearly_explained)
-    limits_.spend([&] {
-      std::optional<Trial> found = selection_->explained_without_a_law([&](const Trial& set) { return noise_or_rig_explain(set); });
-      if (!begun_) begun_ = std::move(found);  // else in the noise of a colour that it leaves
-    });
+    limits_.spend([&] { begin_without_a_law(true); });
 }
 
 void DiagnosisSearch::look_for_a_law() {
   if (may_find_laws_ && mismatch_.found && !description_explains_ && !begun_)
     limits_.spend([&] {
       tell("looking for a law in the force that is missing");
-      LawsTried searched = search_laws(fit_problem_, baseline_, baseline_, LawSearch::Among::laws_and_forms, [&](const Trial& set) { return is_no_law(set); }, *selection_);
+      // Far from the truth a step tells little of a filter or of further modes.
+      const auto otherwise = [&] { return baseline_.reduced_chi2() > nearly_explained && begin_without_a_law(false); };
+      LawsTried searched = search_laws(fit_problem_, baseline_, baseline_, LawSearch::Among::laws_and_forms, [&](const Trial& set) { return is_no_law(set); }, *selection_, {{}, {}, otherwise});
       laws_tried_ = std::move(searched.tried);
       asked_forms_ = searched.forms;
+      if (begun_) return;
       hold_laws_in_the_noise_they_leave();
       if (!none_leaves_nothing(laws_tried_)) keep_law_unless_challenged();
     });
@@ -223,7 +230,7 @@ void DiagnosisSearch::look_for_effects() {
   if (laws_) return;
   // Laws of the list that take most of the mismatch.
   const auto takes_most = [&](const Trial& t) { return std::none_of(t.effects.begin(), t.effects.end(), is_law_id) && t.excess() < half_of_it * baseline_.excess() && bic_difference(t, baseline_) < -decisive; };
-  if (const auto first = std::find_if(laws_tried_.begin(), laws_tried_.end(), takes_most); first != laws_tried_.end()) begun_ = *first;
+  if (const auto first = std::find_if(laws_tried_.begin(), laws_tried_.end(), takes_most); !begun_ && first != laws_tried_.end()) begun_ = *first;
   const auto enough = [&](const Trial& set) { return beside_description_ || noise_or_rig_explain(set); };
   Trial best = begun_ ? *begun_ : baseline_;
   limits_.spend([&] { best = selection_->best_set(enough, begun_ ? &*begun_ : nullptr); });
@@ -247,8 +254,8 @@ void DiagnosisSearch::weigh_description() {
   if (problem_.hidden) exact_ = held_against(*problem_.hidden, described_ ? *description_->problem : fit_problem_, described_ ? description_->trial : baseline_, *selection_, found_);
 }
 
-void DiagnosisSearch::look_for_forms_beside(const Trial& base) {
-  for (Trial& t : search_laws(fit_problem_, baseline_, base, LawSearch::Among::forms, [&](const Trial& set) { return is_no_law(set); }, *selection_).tried) laws_tried_.push_back(std::move(t));
+void DiagnosisSearch::look_for_forms_beside(const Trial& base, LawSearch::Known known) {
+  for (Trial& t : search_laws(fit_problem_, baseline_, base, LawSearch::Among::forms, [&](const Trial& set) { return is_no_law(set); }, *selection_, std::move(known)).tried) laws_tried_.push_back(std::move(t));
 }
 
 void DiagnosisSearch::look_for_the_law_of_what_remains() {
@@ -257,9 +264,9 @@ void DiagnosisSearch::look_for_the_law_of_what_remains() {
     limits_.spend([&] {
       tell("looking for the law of what is missing");
       // Forms were held against laws of the list before, and are looked for beside what takes most of the mismatch below.
-      if (!asked_forms_ && (one_law || found_.best.excess() > half_of_it * baseline_.excess())) look_for_forms_beside(baseline_);
+      if (!asked_forms_ && (one_law || found_.best.excess() > half_of_it * baseline_.excess())) look_for_forms_beside(baseline_, one_law && !none_leaves_nothing({found_.best}) ? LawSearch::Known{{}, {found_.best}, {}} : LawSearch::Known());
       const bool were_looked_for = begun_ && same_set(begun_->effects, found_.best.effects);
-      if (!found_.best.effects.empty() && !were_looked_for && !found_.explains()) look_for_forms_beside(found_.best);
+      if (!found_.best.effects.empty() && !were_looked_for && !found_.explains()) look_for_forms_beside(found_.best, {});
       laws_ = choose_law(problem_, fit_problem_, files(), baseline_, laws_tried_, *selection_, found_);
     });
   if (!laws_) fit_problem_.rig.laws.clear();  // a search that was stopped leaves its forms there

@@ -49,8 +49,9 @@ bool is_undetermined(const FitProblem& problem, const Trial& set) {
 
 bool none_leaves_nothing(const std::vector<Trial>& tried) { return std::all_of(tried.begin(), tried.end(), leaves_something); }
 
-LawsTried search_laws(FitProblem& fit_problem, const Trial& baseline, const Trial& base, LawSearch::Among among, const LawSearch::Asked& is_no_law, Selection& selection) {
-  LawSearch search(fit_problem, base, leaves_something, is_no_law, among, base.effects.empty() ? selection.screened_alone() : std::vector<Trial>{});
+LawsTried search_laws(FitProblem& fit_problem, const Trial& baseline, const Trial& base, LawSearch::Among among, const LawSearch::Asked& is_no_law, Selection& selection, LawSearch::Known known) {
+  if (base.effects.empty()) known.screened = selection.screened_alone();
+  LawSearch search(fit_problem, base, leaves_something, is_no_law, among, std::move(known));
   LawsTried found{search.search(), search.asked_forms()};
   for (const Trial& t : found.tried) selection.add({t.effects, t.reduced_chi2(), bic_difference(t, baseline), 0, 0});
   for (const Trial& t : search.refuted()) selection.add({t.effects, t.reduced_chi2(), bic_difference(t, baseline), 0, 0, SearchOutcome::ruled_out});

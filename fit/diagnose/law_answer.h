@@ -25,8 +25,8 @@ struct LawsTried {
   std::vector<Trial> tried;
   bool forms = false;  ///< those of the dictionary were asked
 };
-/// Laws beside `base`, which the ranking gets. `is_no_law`: whether what a set leaves is explained without any other law.
-LawsTried search_laws(FitProblem& fit_problem, const Trial& baseline, const Trial& base, LawSearch::Among among, const LawSearch::Asked& is_no_law, Selection& selection);
+/// Laws beside `base`, which the ranking gets. `is_no_law`: whether what a set leaves is explained without any other law. What is `known` but for effects beside nothing, which the selection has screened.
+LawsTried search_laws(FitProblem& fit_problem, const Trial& baseline, const Trial& base, LawSearch::Among among, const LawSearch::Asked& is_no_law, Selection& selection, LawSearch::Known known);
 
 /// What was tried, in the noise with a colour that `first` of it has by now; the ranking gets that. Without what leaves twice the excess: beyond any evidence.
 std::vector<Trial> in_noise_of(const Trial& first, const std::vector<Trial>& tried, const Trial& baseline, Selection& selection);

@@ -421,12 +421,12 @@ Trial Selection::best_set(const std::function<bool(const Trial&)>& enough, const
   return bic_difference(best, baseline_) > -decisive ? baseline_ : best;  // of lines alone
 }
 
-std::optional<Trial> Selection::explained_without_a_law(const std::function<bool(const Trial&)>& enough) {
+std::optional<Trial> Selection::explained_without_a_law(const std::function<bool(const Trial&)>& enough, bool promising) {
   tell("trying what may be missing, without a law");
   double most = 0;
   for (const Trial& t : screened_alone()) most = std::max(most, t.score);
   Trials linear;
-  std::copy_if(screened_alone().begin(), screened_alone().end(), std::back_inserter(linear), [&](const Trial& t) { return t.score > quarter_of_it * most && !nonlinear(t); });
+  std::copy_if(screened_alone().begin(), screened_alone().end(), std::back_inserter(linear), [&](const Trial& t) { return (t.score > quarter_of_it * most) == promising && !nonlinear(t); });
   fit_linear(linear);
   keep_distinct(linear);
   std::erase_if(linear, [](const Trial& t) { return t.reduced_chi2() > nearly_explained || !plausible(t); });

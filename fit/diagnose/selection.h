@@ -36,7 +36,8 @@ class Selection {
   Trial best_set(const std::function<bool(const Trial&)>& enough = {}, const Trial* begun = nullptr);
 
   /// Of effects without a law, which are fitted in a tenth to a hundredth of the work, the one that leaves nothing by itself, or something that `enough` says is explained.
-  std::optional<Trial> explained_without_a_law(const std::function<bool(const Trial&)>& enough);
+  /// `promising`: of those that promise a quarter of the most to first order, otherwise of the others.
+  std::optional<Trial> explained_without_a_law(const std::function<bool(const Trial&)>& enough, bool promising);
 
   /// `other` explains everything without an effect: a law that promises less than half of what it takes beyond a set, or a signal that promises less than a quarter, does not come out ahead beside that, and is not fitted.
   void hold_against(const Trial& other) { held_against_ = other.variance; }

@@ -69,8 +69,8 @@ Eigen::VectorXd start_of(Form form, const BesideUnknownForces& beside) {
 
 }  // namespace
 
-LawSearch::LawSearch(FitProblem& problem, const Trial& base, Asked leaves_something, Asked is_no_law, Among among, std::vector<Trial> screened)
-    : problem_(problem), base_(base), leaves_something_(std::move(leaves_something)), is_no_law_(std::move(is_no_law)), among_(among), screened_(std::move(screened)) {}
+LawSearch::LawSearch(FitProblem& problem, const Trial& base, Asked leaves_something, Asked is_no_law, Among among, Known known)
+    : problem_(problem), base_(base), leaves_something_(std::move(leaves_something)), is_no_law_(std::move(is_no_law)), among_(among), known_(std::move(known)) {}
 
 /// What `which` of the forms promise to first order at the best of their starts, where they stand then; -inf for those at work and for all others. The rig gets these.
 std::vector<double> LawSearch::screen_forms(const Trial& base, const Screening& screening, std::vector<Form>& forms, const std::vector<std::size_t>& which) {
@@ -202,8 +202,8 @@ std::vector<Trial> LawSearch::screened_beside(const Trial& base, const std::vect
   std::vector<std::optional<Trial>> trials(ids.size());
   std::vector<std::size_t> unknown;
   for (std::size_t i = 0; i < ids.size(); ++i) {
-    const auto known = std::find_if(screened_.begin(), screened_.end(), [&](const Trial& t) { return t.effects.back() == ids[i]; });
-    if (&base == &base_ && known != screened_.end()) trials[i] = *known;
+    const auto known = std::find_if(known_.screened.begin(), known_.screened.end(), [&](const Trial& t) { return t.effects.back() == ids[i]; });
+    if (&base == &base_ && known != known_.screened.end()) trials[i] = *known;
     else unknown.push_back(i);
   }
   if (!unknown.empty()) {
@@ -235,18 +235,24 @@ LawSearch::Prospects LawSearch::prospects(const Trial& base, std::vector<Trial> 
   return found;
 }
 
+/// Whether a law does that was found here before its forms, or by others.
+bool LawSearch::list_leaves_nothing() const {
+  return !known_.explain.empty() || std::any_of(found_.begin(), found_.end(), [&](const Trial& t) { return !leaves_something_(t); });
+}
+
 /// Forms that may explain what laws of the list do not, or as well. Of one that leaves nothing of a mismatch too large for two laws to explain alike only what promises more with no more parameters is a rival.
 LawSearch::Prospects LawSearch::rivals_promised() {
-  const bool none = base_.reduced_chi2() > nearly_explained && std::any_of(found_.begin(), found_.end(), [&](const Trial& t) { return !leaves_something_(t); });
+  const bool none = base_.reduced_chi2() > nearly_explained && list_leaves_nothing();
   Prospects forms = prospects(base_, screened_beside(base_, forms_worth_a_fit(base_, promised_)), promised_, none ? 1 : half_of_it);
   const auto parameters = [&](const Trial& t) { return effect(problem_.rig, t.effects.back()).parameters_on(problem_.rig).size(); };
-  if (none) std::erase_if(forms.laws, [&](const Trial& t) { return parameters(t) > parameters(found_.front()); });
+  const Trial* best = !found_.empty() ? &found_.front() : !known_.explain.empty() ? &known_.explain.front() : nullptr;
+  if (none) std::erase_if(forms.laws, [&](const Trial& t) { return parameters(t) > parameters(*best); });
   return forms;
 }
 
 /// The same of those that the decays ask for: where a law of the list leaves nothing only formulas with more evidence, and none where a signal promises more than any law to first order, unless a curve is among them.
 LawSearch::Prospects LawSearch::rivals_asked_for() {
-  const bool is_explained_by_list = !has_curve_ && std::any_of(found_.begin(), found_.end(), [&](const Trial& t) { return !leaves_something_(t); });  // noise of a colour takes up what another law leaves
+  const bool is_explained_by_list = !has_curve_ && list_leaves_nothing();  // noise of a colour takes up what another law leaves
   std::vector<std::string> ids;
   keep_laws_of(base_);
   for (const AskedFor& a : asked_) {
@@ -290,7 +296,8 @@ void LawSearch::follow(std::vector<Trial> tried, const Trial& base, bool from_he
   const auto is_near = [&](const Trial& t) { return !told(t) || left_of_decays(t) < nearly_explained; };  // what leaves more of the decays is at most what another law acts beside
   const std::size_t others = found_.size();
   double least = INFINITY;
-  for (const Trial& t : found_) least = std::min(least, std::max(excess(t), explained - 1));
+  for (const std::vector<Trial>* before : {&known_.explain, &found_})
+    for (const Trial& t : *before) least = std::min(least, std::max(excess(t), explained - 1));
   const auto follow_some = [&](std::size_t first, std::size_t& end) {
     if (one_will_do) {
       bool follows = false;
@@ -337,7 +344,7 @@ bool LawSearch::signals_leave_nothing(const Promised& promised) const {
 
 /// Whether the best asks for another law beside it.
 bool LawSearch::goes_on() {
-  if (found_.empty()) return false;
+  if (found_.empty() || !known_.explain.empty()) return false;
   const Trial& best = found_.front();
   if (best.effects.size() >= most_effects || runs_away(best) || !leaves_something_(best)) return false;
   const bool takes_from_decays = shows_in_decays(base_) && left_of_decays(best) < half_of_it * left_of_decays(base_);  // other runs may not have been followed
@@ -354,7 +361,7 @@ bool LawSearch::is_explained(const Trial& trial) {
 
 /// A search among many ends before the least chi-square of any: where it is near, the first is taken there before it is asked what it leaves. Of runs that are driven, from first guesses with what is known of the law by now.
 void LawSearch::settle_first() {
-  if (found_.empty()) return;
+  if (found_.empty() || !known_.explain.empty()) return;
   Trial& best = found_.front();
   if (best.is_settled || !leaves_something_(best) || best.reduced_chi2() > nearly_explained || decays_decide(best) || bic_difference(best, base_) >= 0) return;
   if (all_driven(best.arrival.joint)) fit_from_first_guesses(problem_, best);
@@ -365,13 +372,15 @@ void LawSearch::settle_first() {
 }
 
 std::vector<Trial> LawSearch::search() {
+  bool otherwise = false;
   try {
     tell("looking for the law of what is missing" + (base_.effects.empty() ? std::string() : " beside " + base_.effects.back()));
     if (among_ == Among::laws_and_forms) {
       if (goes_by_evidence()) follow_what_decays_ask_for();
       if (!any_explains()) follow_the_list();
+      otherwise = !any_explains() && known_.otherwise && known_.otherwise();
     }
-    if (!signals_leave_nothing(promised_)) {
+    if (!otherwise && !signals_leave_nothing(promised_)) {
       if (shows_in_decays(base_)) look_for_a_curve();
       follow_rivals();
       if (goes_on()) look_for_a_second();
@@ -387,10 +396,10 @@ std::vector<Trial> LawSearch::search() {
 }
 
 /// Far from the noise a step to first order says little.
-bool LawSearch::goes_by_evidence() const { return among_ == Among::laws_and_forms && base_.reduced_chi2() > nearly_explained && shows_in_decays(base_); }
+bool LawSearch::goes_by_evidence() const { return (among_ == Among::laws_and_forms || !known_.explain.empty()) && base_.reduced_chi2() > nearly_explained && shows_in_decays(base_); }
 
 bool LawSearch::any_explains() {
-  return std::any_of(found_.begin(), found_.end(), [&](const Trial& t) { return is_explained(t); });
+  return !known_.explain.empty() || std::any_of(found_.begin(), found_.end(), [&](const Trial& t) { return is_explained(t); });
 }
 
 /// Follows these, and what was found is in order again.
@@ -456,6 +465,7 @@ void LawSearch::look_for_a_curve() {
 /// Forms.
 void LawSearch::follow_rivals() {
   asked_forms_ = true;
+  if (goes_by_evidence()) ask_decays();
   try_all((goes_by_evidence() || has_curve_ ? rivals_asked_for() : rivals_promised()).laws, base_);
 }
 

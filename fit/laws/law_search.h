@@ -25,7 +25,7 @@ namespace unrig {
 /// forms, which are their rivals; no forms where a signal promises to leave nothing.
 ///
 /// Where no law of the list takes all but a few per cent of it, and the decays show it, a curve of the state is looked for (curve_of_state.h), formulas and laws of the list are asked for anew along the states that go with it,
-/// and all these are followed.
+/// and all these are followed. What others know to explain the runs (Known) has only rivals: no curve is asked for, and no second law.
 ///
 /// Where more than ten times the noise is left a step to first order says little. If the decays show the mismatch, laws and forms are then asked for by evidence: their forces along the states that the decays ask for, regressed on the
 /// innovations of a filter for which the force is unknown (screen). Laws of the list come first, each from where the regression has it, then the two with most evidence together.
@@ -37,9 +37,15 @@ class LawSearch {
   enum class Among { forms, laws_and_forms };
 
   using Asked = std::function<bool(const Trial&)>;
+  /// What others have found before.
+  struct Known {
+    std::vector<Trial> screened;  ///< effects of the list beside the base, each by itself
+    std::vector<Trial> explain;   ///< laws of the list that leave nothing
+    std::function<bool()> otherwise;  ///< asked where no law of the list leaves nothing: whether anything else does
+  };
   /// `problem` lives as long as what is found, and its rig gets the laws that are tried. `leaves_something`: whether a fit does; `is_no_law`: whether
-  /// noise of a colour explains that, or the rig's description. `screened`: effects of the list beside `base` where they were screened before, each by itself.
-  LawSearch(FitProblem& problem, const Trial& base, Asked leaves_something, Asked is_no_law, Among among, std::vector<Trial> screened = {});
+  /// noise of a colour explains that, or the rig's description.
+  LawSearch(FitProblem& problem, const Trial& base, Asked leaves_something, Asked is_no_law, Among among, Known known = {});
 
   /// All sets that were fitted in full, `base` with one law more or two, the best first; empty where no form explains anything. Where the limits of the search are reached, those that were followed by then.
   std::vector<Trial> search();
@@ -83,6 +89,7 @@ class LawSearch {
   void follow(std::vector<Trial> tried, const Trial& base, bool from_here);
   void try_all(std::vector<Trial> trials, const Trial& base, bool from_here = true);
   bool goes_by_evidence() const;
+  bool list_leaves_nothing() const;
   bool any_explains();
   bool goes_on();
   void ask_decays();
@@ -102,7 +109,7 @@ class LawSearch {
   const Trial& base_;
   Asked leaves_something_, is_no_law_;
   Among among_;
-  std::vector<Trial> screened_;  // beside the base
+  Known known_;
   std::vector<Trial> found_;  // all that were followed, the best first
   std::vector<Trial> refuted_;
   std::vector<AskedFor> asked_;  // by the decays, the most evident first

@@ -117,7 +117,7 @@ with tempfile.TemporaryDirectory() as folder:
 
     # Ctrl-C in the middle of a call ends it there: it does not come to say all that a whole call says.
     drag = [str(campaign.parent / "drag" / name) for name in ("rig.toml", "dry_pluck.csv", "wet_pluck.csv")]
-    for name, call in (("trial", lambda tell: unrig.trial(rig, [runs[0]], trials=200, effects=["mains-hum"], progress=tell)), ("diagnose", lambda tell: unrig.diagnose(drag[0], drag[1:], progress=tell)),
+    for name, call in (("trial", lambda tell: unrig.trial(rig, [runs[0]], trials=30, effects=["mains-hum"], progress=tell)), ("diagnose", lambda tell: unrig.diagnose(drag[0], drag[1:], effects=["quadratic-drag", "gauge-lowpass"], progress=tell)),
                        ("fit", lambda tell: unrig.fit(rig, runs, profile=["all"], progress=tell))):
         whole, told = [], []
         call(whole.append)

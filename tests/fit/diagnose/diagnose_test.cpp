@@ -70,6 +70,18 @@ TEST(Diagnose, FindsTheTankWave) {
 TEST(Diagnose, FindsTheLowpass) {
   expect_verdict("lowpass", {{"gauge-lowpass.cutoff", nlohmann::json::parse(read_text(campaigns + "KEY.json"))["lowpass"]["parameters"]["cutoff_hz"]}});
 }
+/// Without the decay in air a step promises the filter nothing, and no law of the list explains these runs.
+TEST(Diagnose, FindsALowpassOfWhichAStepPromisesNothing) {
+  DiagnoseProblem problem = fitted_runs("lowpass");
+  std::erase_if(problem.runs, [](const unrig::Run& run) { return run.file.find("dry") != std::string::npos || run.file.find("step_c") != std::string::npos; });
+  ASSERT_EQ(problem.runs.size(), 3u);
+  problem.verdict_only = true;
+  const Diagnosis d = diagnose(problem);
+  ASSERT_EQ(d.missing.size(), 1u);
+  EXPECT_EQ(d.missing.front().effect, "gauge-lowpass");
+  EXPECT_FALSE(d.unexplained);
+  EXPECT_FALSE(d.stopped);
+}
 TEST(Diagnose, FindsTheHigherModes) { expect_verdict("highermode", {}); }
 TEST(Diagnose, FindsTheQuadraticDrag) {
   expect_verdict("drag", {{"quadratic-drag.coefficient", nlohmann::json::parse(read_text(campaigns + "KEY.json"))["drag"]["parameters"]["drag_coefficient"]}});

@@ -96,11 +96,11 @@ struct Fitted {
 TEST(Selection, AnEffectWithoutALawIsFoundByItselfWhereItExplainsTheRuns) {
   const auto never = [](const Trial&) { return false; };
   const Fitted wave("wave"), friction("friction");
-  const std::optional<Trial> found = Selection(wave.problem, wave.fit, wave.baseline).explained_without_a_law(never);
+  const std::optional<Trial> found = Selection(wave.problem, wave.fit, wave.baseline).explained_without_a_law(never, true);
   ASSERT_TRUE(found);
   EXPECT_EQ(found->effects, Strings{"tank-wave"});
   EXPECT_FALSE(what_remains(*found).found);
-  EXPECT_FALSE(Selection(friction.problem, friction.fit, friction.baseline).explained_without_a_law(never));
+  EXPECT_FALSE(Selection(friction.problem, friction.fit, friction.baseline).explained_without_a_law(never, true));
 }
 
 /// Within its yield displacement hysteresis is a spring, as the rig is one: no reading tells how large its force could get.

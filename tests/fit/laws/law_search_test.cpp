@@ -296,10 +296,33 @@ TEST(LawSearch, TellsWhatTheDecaysRefute) {
   diagnosis.rig = problem.rig;
   diagnosis.runs = problem.runs;
   Selection selection(diagnosis, problem, base);
-  search_laws(problem, base, base, LawSearch::Among::forms, never, selection);
+  search_laws(problem, base, base, LawSearch::Among::forms, never, selection, {});
   const std::vector<Candidate> ranking = selection.ranking();
   for (const Trial& t : search.refuted())
     EXPECT_TRUE(std::any_of(ranking.begin(), ranking.end(), [&](const Candidate& c) { return c.effects == t.effects && c.search == SearchOutcome::ruled_out; })) << t.effects.back();
+}
+
+/// What no formula fits is no question where a law of the list that others have found explains the runs.
+TEST(LawSearch, AsksForNoCurveWhereALawIsKnownThatExplainsTheRuns) {
+  const double spring = 0.08 * stiffness;
+  FitProblem problem = two_decays::problem([&](double x, double) { return -spring * x * x * x; });
+  const Trial base = fit_baseline(problem);
+  const auto leaves_something = [](const Trial& t) { return what_remains(t).found; };
+  const std::vector<Trial> listed = LawSearch(problem, base, leaves_something, never, LawSearch::Among::laws_and_forms).search();
+  ASSERT_FALSE(listed.empty());
+  ASSERT_EQ(listed.front().effects, std::vector<std::string>{"cubic-stiffness"});
+  const auto tried = [&](const LawSearch::Known& known) {
+    LawSearch search(problem, base, leaves_something, never, LawSearch::Among::forms, known);
+    std::vector<std::string> ids;
+    for (const Trial& t : search.search()) ids.push_back(t.effects.back());
+    for (const Trial& t : search.refuted()) ids.push_back(t.effects.back());
+    return ids;
+  };
+  const auto is_curve = [](const std::string& id) { return id.starts_with("law:curve"); };
+  const std::vector<std::string> rivals = tried({{}, {listed.front()}, {}}), of_nothing = tried(LawSearch::Known());
+  EXPECT_TRUE(std::any_of(of_nothing.begin(), of_nothing.end(), is_curve)) << "otherwise these decays test nothing";
+  EXPECT_TRUE(std::none_of(rivals.begin(), rivals.end(), is_curve));
+  EXPECT_EQ(std::count(rivals.begin(), rivals.end(), "cubic-stiffness"), 0) << "what was known is not found anew";
 }
 
 TEST(Dictionary, ReadsBackAsItIsWritten) {
