@@ -280,6 +280,7 @@ Trials Selection::rivals(const Trial& best, const std::string& member) {
   // chi-square: with the member, as it is without, and where a step without it ends; the first step may lead astray.
   const double with_it = best.arrival.joint.chi2(), without = std::min(others.arrival.joint.chi2(), others.promised_left);
   const Strings ids = candidates(best.effects, {});
+  const bool of_a_law = is_a_law(member, best.arrival.joint);
   const Screening screening(fit_problem_, others.arrival);
   std::vector<std::optional<Trial>> prepared(ids.size());
   in_parallel(ids.size(), [&](std::size_t i) {
@@ -287,20 +288,31 @@ Trials Selection::rivals(const Trial& best, const std::string& member) {
     set.push_back(ids[i]);
     if (is_fitted(set)) return;
     Trial trial = screened(fit_problem_, screening, others, set);
-    if (brings_a_law(trial) && others.reduced_chi2() > nearly_explained) return;  // too large a mismatch for two laws to explain alike
+    if (of_a_law && brings_a_law(trial) && others.reduced_chi2() > nearly_explained) return;  // too large a mismatch for two laws to explain alike
     if (takes_too_little(trial, others)) return;
     if (without - trial.promised_left > half_of_it * (without - with_it)) prepared[i] = std::move(trial);
   });
   Trials rivals;
   for (std::optional<Trial>& trial : prepared)
     if (trial) rivals.push_back(std::move(*trial));
-  in_parallel(rivals.size(), [&](std::size_t i) {
-    Trial& rival = rivals[i];
+  const auto follow = [&](Trial& rival) {
     hold_undetermined(rival);
     if (!brings_a_law(rival)) fit_fully(rival, 2);
     else if (!follow_nonlinear(fit_problem_, rival, others, others.reduced_chi2())) return;
     if (leaves_nothing(rival) && !decays_decide(rival)) leave_out_terms(rival);
-  });
+  };
+  // Here a step tells much. Of a mismatch too large for two laws to explain alike none is followed behind one that leaves nothing.
+  const bool one_law_will_do = others.reduced_chi2() > nearly_explained;
+  std::stable_sort(rivals.begin(), rivals.end(), [](const Trial& a, const Trial& b) { return a.promised_left < b.promised_left; });
+  const auto laws = std::stable_partition(rivals.begin(), rivals.end(), [&](const Trial& t) { return !(one_law_will_do && brings_a_law(t)); });
+  in_parallel(static_cast<std::size_t>(laws - rivals.begin()), [&](std::size_t i) { follow(rivals[i]); });
+  for (auto law = laws; law != rivals.end(); ++law) {
+    follow(*law);
+    if (leaves_nothing(*law)) {
+      rivals.erase(law + 1, rivals.end());
+      break;
+    }
+  }
   keep_distinct(rivals);
   std::erase_if(rivals, [](const Trial& t) { return t.ruled_out || !plausible(t); });
   std::sort(rivals.begin(), rivals.end(), [](const Trial& a, const Trial& b) { return bic_difference(a, b) < 0; });

@@ -107,10 +107,12 @@ bool nonlinear(const Trial& trial) {
   });
 }
 
-bool brings_a_law(const Trial& trial) {
-  const AeroelasticModel& model = trial.arrival.joint.model();
-  return is_a_law(trial.effects.back(), AeroelasticModel(model.rig(), model.basis(), model.circulation()), trial.arrival.joint);
+bool is_a_law(const std::string& id, const JointProblem& joint) {
+  const AeroelasticModel& model = joint.model();
+  return is_a_law(id, AeroelasticModel(model.rig(), model.basis(), model.circulation()), joint);
 }
+
+bool brings_a_law(const Trial& trial) { return is_a_law(trial.effects.back(), trial.arrival.joint); }
 
 bool is_a_signal(const std::string& id, const JointProblem& joint) {
   const AeroelasticModel& all = joint.model();
@@ -260,7 +262,7 @@ bool is_missed_by_decays(Trial& fewer, const Trial& with) {
 /// Whether an effect is missed before anything is fitted without it. Of a signal, if a step from where the fit stands leaves far more than what it saves in parameters: a step follows signals.
 bool is_missed(Trial& fewer, const Trial& with, const std::string& id) {
   const JointProblem& joint = with.arrival.joint;
-  if (is_a_law(id, AeroelasticModel(joint.model().rig(), joint.model().basis(), joint.model().circulation()), joint)) return is_missed_by_decays(fewer, with);
+  if (is_a_law(id, joint)) return is_missed_by_decays(fewer, with);
   measure(fewer);
   double samples = 0;
   for (const double n : with.samples) samples += n;

@@ -42,6 +42,7 @@ bool any_aside(const JointProblem& joint);
 bool nonlinear(const Trial& trial);
 /// Whether the last effect is such a law.
 bool brings_a_law(const Trial& trial);
+bool is_a_law(const std::string& id, const JointProblem& joint);
 
 /// Whether an effect is a signal with amplitudes of its own in each run, which take a share of anything that lies at its frequencies.
 bool is_a_signal(const std::string& id, const JointProblem& joint);
