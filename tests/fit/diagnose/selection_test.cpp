@@ -103,6 +103,17 @@ TEST(Selection, AnEffectWithoutALawIsFoundByItselfWhereItExplainsTheRuns) {
   EXPECT_FALSE(Selection(friction.problem, friction.fit, friction.baseline).explained_without_a_law(never, true));
 }
 
+/// A wave with an amplitude and a phase for every run takes most of what a drag does.
+TEST(Selection, ASignalThatStandsInForALawIsChallengedByIt) {
+  Fitted drag("drag");
+  drag.problem.effects = {"tank-wave", "quadratic-drag"};
+  Trial wave = prepare(drag.fit, drag.baseline, {"tank-wave"});
+  fit_fully(wave, 6);
+  ASSERT_GT(drag.baseline.reduced_chi2(), 10) << "otherwise this tests nothing of mismatches that no two laws explain alike";
+  ASSERT_LT(wave.reduced_chi2(), 0.5 * drag.baseline.reduced_chi2());
+  EXPECT_EQ(Selection(drag.problem, drag.fit, drag.baseline).challenged(wave).effects, Strings{"quadratic-drag"});
+}
+
 /// Within its yield displacement hysteresis is a spring, as the rig is one: no reading tells how large its force could get.
 TEST(LawAnswer, AnEffectIsUndeterminedWhereTheRunsTellNothingOfIt) {
   const FitProblem problem = two_decays::problem([](double x, double) { return -0.08 * two_decays::stiffness * x * x * x; });
