@@ -280,7 +280,7 @@ Trials Selection::rivals(const Trial& best, const std::string& member) {
   // chi-square: with the member, as it is without, and where a step without it ends; the first step may lead astray.
   const double with_it = best.arrival.joint.chi2(), without = std::min(others.arrival.joint.chi2(), others.promised_left);
   const Strings ids = candidates(best.effects, {});
-  const bool of_a_law = is_a_law(member, best.arrival.joint);
+  const bool of_a_law = is_a_law(member, best.arrival.joint), one_law_will_do = others.reduced_chi2() > nearly_explained;
   const Screening screening(fit_problem_, others.arrival);
   std::vector<std::optional<Trial>> prepared(ids.size());
   in_parallel(ids.size(), [&](std::size_t i) {
@@ -288,9 +288,10 @@ Trials Selection::rivals(const Trial& best, const std::string& member) {
     set.push_back(ids[i]);
     if (is_fitted(set)) return;
     Trial trial = screened(fit_problem_, screening, others, set);
-    if (of_a_law && brings_a_law(trial) && others.reduced_chi2() > nearly_explained) return;  // too large a mismatch for two laws to explain alike
+    if (of_a_law && one_law_will_do && brings_a_law(trial)) return;  // too large a mismatch for two laws to explain alike
     if (takes_too_little(trial, others)) return;
-    if (without - trial.promised_left > half_of_it * (without - with_it)) prepared[i] = std::move(trial);
+    const double least = brings_a_law(trial) && one_law_will_do ? as_much : half_of_it;  // where a signal explains the runs a step tells nearly all of a law that does
+    if (without - trial.promised_left > least * (without - with_it)) prepared[i] = std::move(trial);
   });
   Trials rivals;
   for (std::optional<Trial>& trial : prepared)
@@ -302,7 +303,6 @@ Trials Selection::rivals(const Trial& best, const std::string& member) {
     if (leaves_nothing(rival) && !decays_decide(rival)) leave_out_terms(rival);
   };
   // Here a step tells much. Of a mismatch too large for two laws to explain alike none is followed behind one that leaves nothing.
-  const bool one_law_will_do = others.reduced_chi2() > nearly_explained;
   std::stable_sort(rivals.begin(), rivals.end(), [](const Trial& a, const Trial& b) { return a.promised_left < b.promised_left; });
   const auto laws = std::stable_partition(rivals.begin(), rivals.end(), [&](const Trial& t) { return !(one_law_will_do && brings_a_law(t)); });
   in_parallel(static_cast<std::size_t>(laws - rivals.begin()), [&](std::size_t i) { follow(rivals[i]); });
