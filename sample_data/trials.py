@@ -73,7 +73,7 @@ def held(trial):
     """Whether the set of explanations holds what is true; `something-else` is none of the others."""
     hidden = sorted(trial["hidden"])
     alike = [sorted(one) for one in trial["explanations"]]
-    return hidden in alike or sorted([*hidden, "rig-description"]) in alike or (bool(hidden) and ["something-else"] in alike) or trial["right"]
+    return hidden in alike or (trial["misread"] is not None and sorted([*hidden, "rig-description"]) in alike) or (bool(hidden) and ["something-else"] in alike) or trial["right"]
 
 
 def seeds(results):

@@ -197,6 +197,7 @@ void DiagnosisSearch::look_for_a_law() {
       LawsTried searched = search_laws(fit_problem_, baseline_, baseline_, LawSearch::Among::laws_and_forms, [&](const Trial& set) { return is_no_law(set); }, *selection_, {{}, {}, otherwise});
       laws_tried_ = std::move(searched.tried);
       asked_forms_ = searched.forms;
+      if (begun_anew_) laws_tried_.clear();  // held against each other in another noise
       if (begun_) return;
       hold_laws_in_the_noise_they_leave();
       if (!none_leaves_nothing(laws_tried_)) keep_law_unless_challenged();

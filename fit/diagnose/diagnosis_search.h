@@ -30,7 +30,6 @@ class DiagnosisSearch {
   /// The numbers of the files, where a step in them promises to explain the mismatch.
   void ask_about_description();
   /// Effects without a law, where the mismatch is too large for a law to explain it as well.
-  bool begin_without_a_law(bool promising);
   void try_without_a_law();
   /// A law that shows in the force on the states. Where one leaves nothing, no set of effects is looked for.
   void look_for_a_law();
@@ -53,6 +52,7 @@ class DiagnosisSearch {
   void begin_anew_in_noise_of(Trial set);
   bool noise_or_rig_explain(const Trial& set);
   bool is_no_law(const Trial& set);
+  bool begin_without_a_law(bool promising);
   void hold_laws_in_the_noise_they_leave();
   void keep_law_unless_challenged();
   void look_for_forms_beside(const Trial& base, LawSearch::Known known);
