@@ -90,30 +90,18 @@ void check_names(const AeroelasticModel& model, const FitProblem& problem) {
     if (name != "all" && !known(name)) throw InputError({"--profile", 0}, "no parameter '" + name + "' can be profiled", "wanted one of " + names, "Or there is no such file: run files may stand behind the option.");
 }
 
-/// Standard deviation of an angle from the cubic through the samples half and three halves of `stride` away, over that of its noise.
-double off_its_knots(const Eigen::VectorXd& angle, Eigen::Index stride) {
-  const double gain = std::sqrt(1 + (1 + 81 + 81 + 1) / 256.0);
-  const Eigen::Index half = (stride + 1) / 2;
-  double squares = 0, count = 0;
-  for (Eigen::Index k = 3 * half; k + 3 * half < angle.size(); ++k) {
-    const double off = angle[k] - (9 * (angle[k - half] + angle[k + half]) - angle[k - 3 * half] - angle[k + 3 * half]) / 16;
-    if (std::isfinite(off)) squares += off * off, ++count;
-  }
-  return count > 0 ? std::sqrt(squares / count) / (gain * noise_level(angle)) : 0;
-}
-
 /// A motion that never rests and is too long and too fast for the knots that a fit has: each look at it takes seconds, and its load is not known after hours.
 void refuse_endless_motion(const FitProblem& problem) {
   constexpr Eigen::Index slow = 10000;  // samples
   constexpr double far = 3;
   if (problem.rig.is_modal()) return;
   for (const Run& run : problem.runs) {
-    const std::vector<MotionBasis::Window> windows = motion_windows(run);
+    const std::vector<MotionBasis::Window> windows = windows_to_fit(run);
     if (windows.size() != 1 || windows.front().knots.length() < slow) continue;
     const Eigen::Index stride = windows.front().stride;
-    if (!(off_its_knots(run.channel("alpha").value, stride) > far)) continue;
+    if (!(off_its_knots(run, windows, stride) > far)) continue;
     throw InputError({run.file, run.header_line}, fmt::format("the angle moves without a rest through {} samples, faster than a knot every {} samples follows", windows.front().knots.length(), stride),
-                     fmt::format("wanted a motion that comes to rest, or one of {} samples at most", most_knots(1)),
+                     fmt::format("wanted a motion that comes to rest, or one of {} samples at most", most_knots_to_fit),
                      "Fit free decays and steps, and give this run to `unrig correct` with that fit: it follows a motion of any length. Or fit the beginning of the record.");
   }
 }

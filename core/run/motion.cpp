@@ -123,10 +123,10 @@ VectorXd MotionBasis::coefficients(const VectorXd& u) const {
   return c;
 }
 
-Eigen::MatrixXd MotionBasis::angle_columns(Interval range) const {
-  Eigen::MatrixXd columns = Eigen::MatrixXd::Zero(range.length(), unknowns());
-  for (Index j = 0; j < unknowns(); ++j) {
-    const Column& column = columns_[static_cast<std::size_t>(j)];
+Eigen::MatrixXd MotionBasis::angle_columns(Interval range, Index first, Index last) const {
+  Eigen::MatrixXd columns = Eigen::MatrixXd::Zero(range.length(), last - first);
+  for (Index j = 0; j < columns.cols(); ++j) {
+    const Column& column = columns_[static_cast<std::size_t>(first + j)];
     const auto coefficient = [&](Index k) {
       if (k < column.first) return 0.0;
       return k - column.first < column.value.size() ? column.value[k - column.first] : column.tail;

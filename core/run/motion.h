@@ -45,7 +45,8 @@ class MotionBasis {
   const std::vector<Column>& columns() const { return columns_; }
 
   Eigen::VectorXd coefficients(const Eigen::VectorXd& u) const;  ///< fine coefficients, one per sample
-  Eigen::MatrixXd angle_columns(Interval samples) const;         ///< d p / d u at these samples
+  Eigen::MatrixXd angle_columns(Interval samples) const { return angle_columns(samples, 0, unknowns()); }  ///< d p / d u at these samples
+  Eigen::MatrixXd angle_columns(Interval samples, Eigen::Index first, Eigen::Index last) const;             ///< of unknowns [first, last)
 
  private:
   Eigen::Index samples_;

@@ -58,7 +58,7 @@ std::vector<double> modes_of(const FittedModel& fitted) {
 
 std::vector<FitTrace> fit_traces(const Rig& stated_rig, const FittedRig& fit, const Run& stated_run) {
   const auto [rig, run, model, theta] = fitted_model(stated_rig, fit, stated_run);
-  RunResidual residual(model, run, motion_windows(run));
+  RunResidual residual(model, run, windows_to_fit(run));
   residual.settle_noise(theta);
   residual.reject_spikes(theta);
   const RunResidual::Prediction p = residual.predict(theta);

@@ -168,6 +168,7 @@ const std::vector<RunResidual::Evaluation>& RunInLegs::by_leg(const RunResidual:
       residual(p).arrive_in(arrival);
     }
     evaluations_.push_back(residual(p).differentiate(solutions_[p]));
+    evaluations_.back().linear_factor = residual(p).linear_factor(solutions_[p]);
   }
   return evaluations_;
 }

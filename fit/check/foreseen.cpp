@@ -29,7 +29,7 @@ VectorXd deviations(const MatrixXd& jacobian) {
 std::vector<Foreseen> foresee(const Rig& rig, const std::vector<Run>& runs) {
   const AeroelasticModel model = model_of(rig, runs, Wagner::within_1e4);
   std::vector<RunResidual> residuals;
-  for (const Run& run : runs) residuals.emplace_back(model, run, motion_windows(run), RunOptions{});
+  for (const Run& run : runs) residuals.emplace_back(model, run, windows_to_fit(run), RunOptions{});
   JointProblem joint(model, std::move(residuals));
   guess_from_spectra(joint);
   hold_undetermined(joint);

@@ -29,7 +29,7 @@ double nearest_value(const JointProblem& fitted, const Unknown& wanted, double o
 }  // namespace
 
 HeldoutResidual predict_heldout(const Arrival& arrival, const Run& run) {
-  const auto windows = motion_windows(run);
+  const auto windows = windows_to_fit(run);
   std::vector<RunResidual> one;
   RunOptions begins;
   begins.free_memories = run.kind == RunKind::forced || run.kind == RunKind::moved;

@@ -27,7 +27,7 @@ Arrival arrival_of(const FitProblem& problem, const FitResult& result) {
   std::vector<std::vector<MotionBasis::Window>> windows;
   std::vector<RunResidual> runs;
   for (const Run& run : problem.runs) {
-    windows.push_back(motion_windows(run));
+    windows.push_back(windows_to_fit(run));
     runs.emplace_back(*model, run, windows.back());
   }
   Arrival arrival{model, std::move(windows), JointProblem(*model, std::move(runs))};

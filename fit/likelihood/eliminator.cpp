@@ -57,29 +57,18 @@ VectorXd Eliminator::covariance_column(Index j) const {
   return solve(factors.topLeftCorner(r, r).triangularView<Eigen::Upper>().transpose().solve(score.head(r)));
 }
 
-MatrixXd Eliminator::factor() const {
-  const Index n = scale_.size();
-  MatrixXd r = MatrixXd::Zero(n, n);
-  if (deficient_) {
-    const Index k = rank();
-    MatrixXd permuted = MatrixXd::Zero(n, n);
-    permuted.topRows(k) = MatrixXd(pivoted_.matrixQR().topRows(k).triangularView<Eigen::Upper>());
-    r = compress(permuted * pivoted_.colsPermutation().transpose());
-  } else {
-    r = quick_.factors().topRows(n).triangularView<Eigen::Upper>();
-  }
-  return r * scale_.cwiseInverse().asDiagonal();
+MatrixXd Eliminator::coordinates() const {
+  const Index r = rank();
+  MatrixXd rows = (deficient_ ? pivoted_.matrixQR() : quick_.factors()).topRows(r).triangularView<Eigen::Upper>();
+  if (deficient_) rows = rows * pivoted_.colsPermutation().transpose();
+  return rows * scale_.cwiseInverse().asDiagonal();
 }
 
-VectorXd damped_step(const MatrixXd& factor, const VectorXd& full, double damping) {
-  const Index n = factor.cols();
-  MatrixXd rows(factor.rows() + n, n);
-  rows.topRows(factor.rows()) = factor;
-  rows.bottomRows(n) = (std::sqrt(damping) * factor.colwise().norm()).asDiagonal();
-  VectorXd target = VectorXd::Zero(rows.rows());
-  target.head(factor.rows()) = factor * full;
-  const Eliminator damped(rows);
-  return damped.solve(damped.rotated(target));
+MatrixXd Eliminator::factor() const {
+  if (!deficient_) return coordinates();
+  MatrixXd r = MatrixXd::Zero(scale_.size(), scale_.size());
+  r.topRows(rank()) = compress(coordinates());
+  return r;
 }
 
 }  // namespace unrig::run_rows

@@ -21,6 +21,8 @@ class Eliminator {
   Eigen::Index rank() const { return deficient_ ? pivoted_.rank() : scale_.size(); }
   /// Coordinates of `rows` in the columns' space (the first `rank` rows) and beside it.
   Eigen::MatrixXd rotated(const Eigen::MatrixXd& rows) const;
+  /// The columns themselves in these coordinates: rank x columns.
+  Eigen::MatrixXd coordinates() const;
   /// Solution of R x = rotated, back in the columns' own scale.
   Eigen::MatrixXd solve(const Eigen::MatrixXd& rotated) const;
   /// Column j of (R^T R)^-1: how the unknowns move with the score of unknown j. Zero for one that the rows do not determine.
@@ -34,8 +36,5 @@ class Eliminator {
   Eigen::ColPivHouseholderQR<Eigen::MatrixXd> pivoted_;
   bool deficient_ = false;
 };
-
-/// Marquardt's (1963) step: s with least |R (s - full)|^2 + damping |D s|^2, D the lengths of R's columns.
-Eigen::VectorXd damped_step(const Eigen::MatrixXd& factor, const Eigen::VectorXd& full, double damping);
 
 }  // namespace unrig::run_rows

@@ -1,4 +1,3 @@
-#include "core/numerics/product.h"
 #include "fit/likelihood/run_linearised.h"
 
 // Rotations of the rows of one channel over one phase of the record.
@@ -29,19 +28,13 @@ MatrixXd Block::add_stretch(double weight, const Rotation& rotation) {
   return weight * rotation->triangle();
 }
 
-MatrixXd Block::join(const std::vector<MatrixXd>& spans, Index offset, Index offsets) {
-  const Index states = start.rows();
-  MatrixXd span = stacked(spans, states + offsets);
-  if (spans.size() > 1) {
-    joint_ = std::make_shared<const Householder>(std::move(span));
-    span = joint_->triangle();
-  }
-  MatrixXd reach = product(span.leftCols(states), start);
-  reach.middleCols(offset, offsets) += span.rightCols(offsets);
-  return reach;
+MatrixXd Block::join(const std::vector<MatrixXd>& spans) {
+  if (spans.size() == 1) return spans.front();
+  joint_ = std::make_shared<const Householder>(stacked(spans, spans.front().cols()));
+  return joint_->triangle();
 }
 
-MatrixXd Block::rotate_rows(const Eigen::VectorXd& w, Index offset) {
+MatrixXd Block::rotate_rows(const Eigen::VectorXd& w) {
   std::vector<MatrixXd> spans;
   for (Index first = 0; first < rows.rows(); first += rest_rows::stretch_samples) {
     const Index length = std::min(rest_rows::stretch_samples, rows.rows() - first);
@@ -49,7 +42,7 @@ MatrixXd Block::rotate_rows(const Eigen::VectorXd& w, Index offset) {
     span << w.segment(first, length).asDiagonal() * rows.middleRows(first, length), w.segment(first, length);
     spans.push_back(add_stretch(std::move(span)));
   }
-  return join(spans, offset);
+  return join(spans);
 }
 
 void Block::rotate(const Interval& some, MatrixXd all, Rotated& rotated) const {

@@ -88,7 +88,8 @@ void RunResidual::take_colour(const RunResidual& other) {
 }
 
 /// [c | reading] of the noise's state at the first sample, which is the filter's start less what the offset has settled it to.
-void RunResidual::add_colour_rows() {
+MatrixXd RunResidual::colour_rows() const {
+  std::vector<MatrixXd> all;
   Index state = first_offset_;
   for (const WhiteningFilter& filter : filters_) state -= filter.states();
   for (std::size_t c = 0, f = 0; c < colour_.size(); ++c) {
@@ -100,9 +101,10 @@ void RunResidual::add_colour_rows() {
     rows.middleCols(state, filter.states()) = root;
     rows.col(first_offset_ + static_cast<Index>(c)) = settled;
     rows.col(unknowns_) = settled * whitened_(0, static_cast<Index>(c));
-    angle_rows_.push_back(std::move(rows));
+    all.push_back(std::move(rows));
     state += filter.states();
   }
+  return run_rows::stacked(all, unknowns_ + 1);
 }
 
 Index RunResidual::filter_states() const {

@@ -46,7 +46,7 @@ RunResidual::FirstOrder::FirstOrder(const RunResidual& run, const VectorXd& thet
     own.rightCols(1) = run.readings().col(c).segment(s.first, s.length()) - m.col(parameters);
   });
   for (Index c = 0; c < channels; ++c) rows.middleRows(c * samples, samples).middleCols(parameters, unknowns) = in_c[static_cast<std::size_t>(c)];
-  const MatrixXd angle = run_rows::stacked(run.angle_rows_, unknowns + 1);
+  const MatrixXd angle = run.angle_rows();
   angle_left_ = angle.col(unknowns) - angle.leftCols(unknowns) * linear_;
   if (model_->noise) {  // theta moves the filter too
     MatrixXd white = MatrixXd::Zero(rows.rows() + angle.rows(), rows.cols());

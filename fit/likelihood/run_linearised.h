@@ -7,7 +7,7 @@
 
 #include "core/propagate/exact_step.h"
 #include "core/numerics/householder.h"
-#include "fit/likelihood/eliminator.h"
+#include "fit/likelihood/chain_eliminator.h"
 #include "fit/likelihood/rest_rows.h"
 #include "fit/likelihood/run_residual.h"
 
@@ -26,7 +26,7 @@ struct Rotated {
   std::vector<Eigen::MatrixXd> kept, others;
 };
 
-/// One channel over one phase of the record. A phase at rest spans only the free response and the offset: its rows are rotated, stretch by stretch and then those kept of
+/// One channel over one piece of the record. One at rest spans only the free response and the offset: its rows are rotated, stretch by stretch and then those kept of
 /// all stretches together, so that few of them hold all that c can reach, and the others only what is left. One in which the shaft moves is rotated where its
 /// own splines, the free response and the offset are clearly fewer than its samples.
 class Block {
@@ -36,8 +36,8 @@ class Block {
   Interval samples;
   bool moving = false;
   Eigen::Index channel = 0;
-  Eigen::MatrixXd start;         ///< d state / d c at the phase's start; behind it, where the run goes on from another part, the state that it arrived in
-  Eigen::MatrixXd rows;          ///< nonlinear systems: d y / d c where the shaft moves, else d y / d state at the phase's start
+  Eigen::MatrixXd start;         ///< d state / d c at the start, of a linear system without the splines that act still; behind it, where the run goes on from another part, the state that it arrived in
+  Eigen::MatrixXd rows;          ///< nonlinear systems: d y / d [state at the start (none where nothing has moved it) | splines that act]
   Eigen::Index smooth_from = 0;  ///< at rest: the sample from which on whole stretches are polynomials; samples.last where none is
 
   Block(const Interval& of, bool moves, Eigen::Index in_channel, Eigen::MatrixXd from, Eigen::MatrixXd tangents, Eigen::Index smooth)
@@ -51,11 +51,10 @@ class Block {
   Eigen::MatrixXd add_stretch(double weight, const Rotation& rotation);
   /// A stretch whose rows are few already.
   void add_smooth_stretch() { rotations_.emplace_back(); }
-  /// Rotates the rows kept of all stretches together; returns what c does to them.
-  /// The columns behind those of the states are of so many offsets.
-  Eigen::MatrixXd join(const std::vector<Eigen::MatrixXd>& spans, Eigen::Index offset, Eigen::Index offsets = 1);
+  /// Rotates the rows kept of all stretches together; returns them.
+  Eigen::MatrixXd join(const std::vector<Eigen::MatrixXd>& spans);
   /// All of that from `rows`.
-  Eigen::MatrixXd rotate_rows(const Eigen::VectorXd& w, Eigen::Index offset);
+  Eigen::MatrixXd rotate_rows(const Eigen::VectorXd& w);
 
   /// Takes the rows of some of its samples, whole stretches of them.
   void rotate(const Interval& some, Eigen::MatrixXd all, Rotated& rotated) const;
@@ -103,16 +102,21 @@ struct RunResidual::Linearised {
   Eigen::MatrixXd known;          // response to the measured inputs, samples x channels, empty without
   Eigen::MatrixXd spline;         // states after a unit spline, n x samples of the longest motion
   Eigen::MatrixXd spline_summed;  // and their running sum: states after splines at every sample
+  Eigen::MatrixXd spline_output, spline_summed_output;  // what the channels read of both, channels x samples
   std::vector<rest_rows::FreeRows> free;  // free response per channel, for a stretch at rest or the longest motion
   Eigen::MatrixXd leap;                   // transition over a stretch at rest
   bool polynomials = false;               // whether what is left of a rest may be looked at as polynomials
 
-  std::vector<run_rows::Block> blocks;  // phase by phase, channel by channel
+  std::vector<run_rows::Block> blocks;  // piece by piece, channel by channel
   Eigen::MatrixXd end;                  // as their starts, behind the last sample
+  bool linked = false;                  // whether each piece is a link of the elimination; else all rows are over c as a whole
 
   /// Solves the stacked rows [c | y] for c, beside a sum of squares that c cannot reach.
   void settle(const std::vector<Eigen::MatrixXd>& rows, Eigen::Index unknowns, double unreachable);
-  std::unique_ptr<run_rows::Eliminator> eliminate;
+  void settle(std::unique_ptr<run_rows::ChainEliminator> chain, const run_rows::ChainEliminator::Rotated& right, double unreachable);
+  std::unique_ptr<run_rows::ChainEliminator> eliminate;
+  run_rows::ChainEliminator::Rotated rotated_links(const RunResidual& run, const std::vector<Eigen::MatrixXd>& reached, Eigen::Index columns) const;
+  run_rows::ChainEliminator::Rotated rotated_whole(const RunResidual& run, std::vector<Eigen::MatrixXd> reached, Eigen::Index columns) const;
   Eigen::VectorXd linear;
   double chi2 = 0;
   bool settled = false;  // of a nonlinear model: the search for c came to rest by itself, and would again

@@ -2,6 +2,7 @@
 #include <cmath>
 #include <utility>
 
+#include "core/numerics/product.h"
 #include "core/propagate/nonlinear_response.h"
 #include "fit/likelihood/run_linearised.h"
 
@@ -12,6 +13,8 @@ namespace unrig {
 using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
+
+using run_rows::stacked;
 
 namespace {
 
@@ -27,13 +30,14 @@ VectorXd RunResidual::whole_jerk(const VectorXd& linear) const {
   return motion_.unknowns() > 0 ? motion_of(motion_.coefficients(linear.head(motion_.unknowns())), run_->dt).jerk : VectorXd();
 }
 
-/// d jerk / d c over these samples: every spline's third difference.
+/// d jerk / d c over these samples, of the splines that act in them: every spline's third difference.
 MatrixXd RunResidual::jerk_slope(const Interval& samples) const {
   constexpr double third_difference[] = {1, -3, 3, -1};
   const double cube = run_->dt * run_->dt * run_->dt;
-  MatrixXd slope = MatrixXd::Zero(samples.length(), unknowns_);
-  for (Index j = 0; j < motion_.unknowns(); ++j) {
-    const MotionBasis::Column& column = motion_.columns()[static_cast<std::size_t>(j)];
+  const Splines splines = splines_in(samples);
+  MatrixXd slope = MatrixXd::Zero(samples.length(), splines.all());
+  for (Index j = 0; j < slope.cols(); ++j) {
+    const MotionBasis::Column& column = motion_.columns()[static_cast<std::size_t>(splines.still + j)];
     const Index length = column.value.size();
     for (Index i = 0; i < length + 3; ++i) {  // from there on the splines of the tail cancel
       const double amount = (i < length ? column.value[i] : column.tail) / cube;
@@ -64,7 +68,8 @@ RunResidual::NonlinearPoint RunResidual::nonlinear_point(const Linearised& lin, 
   point.left = readings().topRows(last_sample_) - response.output;
   point.left.rowwise() -= linear.segment(first_offset_, measured_.cols()).transpose();
   point.chi2 = lin.noise ? lin.white(*this, point.left.reshaped()).squaredNorm() : weight_.topRows(last_sample_).cwiseProduct(point.left).squaredNorm();
-  for (const MatrixXd& rows : angle_rows_) point.chi2 += (rows.leftCols(unknowns_) * linear - rows.col(unknowns_)).squaredNorm();
+  point.chi2 += held_residual(linear).squaredNorm();
+  for (std::size_t p = 0; p < angle_rows_.size(); ++p) point.chi2 += angle_residual(p, linear).squaredNorm();
   return point;
 }
 
@@ -77,68 +82,124 @@ VectorXd RunResidual::largest_arguments(const VectorXd& theta) const {
   return follow(lin.system, lin.step, theta, from, last_sample_, Partials::none).largest_argument;
 }
 
-/// The rows [c | y] of the model linearised about `linear`; solves them for the next c. False where the model diverges.
+/// The rows of the model linearised about `linear`, piece by piece; solves them for the next c. False where the model diverges. The state of a link is that of the model, of the filters of the
+/// noise behind it, with what the splines that act still have done so far.
 bool RunResidual::stack_nonlinear_rows(Linearised& lin, const VectorXd& theta, const VectorXd& linear) const {
-  const Index n = lin.system.states(), with_filters = n + filter_states();
+  const Index n = lin.system.states(), with_filters = n + filter_states(), last = unknowns_ - first_state_, level = motion_.unknowns() > 0 ? 1 : 0;
   const VectorXd jerk = whole_jerk(linear);
   NonlinearDrive from{initial_state(linear, n), {}, {}, {}, {}};
   FilterStates filters = filters_at(initial_state(linear, with_filters));
   MatrixXd start = MatrixXd::Zero(with_filters, unknowns_);  // d state / d c, those of the filters behind the model's
   for (std::size_t i = 0; i < free_.size(); ++i) start(free_[i], first_state_ + static_cast<Index>(i)) = 1;
-  std::vector<MatrixXd> rows;
+  const std::size_t count = counted_pieces();
+  std::vector<run_rows::Link> links(count);
+  std::vector<MatrixXd> right(count), rows;  // rows: [c | y], where a prior on the motion holds many knots together
   double unreachable = 0;
   lin.blocks.clear();
-  for (const MotionBasis::Phase& phase : phases_) {
-    const Interval s = counted(phase);
-    if (s.length() <= 0) break;
-    drive_over(s, phase.moving, jerk, inputs_, from);
-    const MatrixXd begin = phase.moving ? start : MatrixXd::Identity(with_filters, with_filters);
-    from.start_tangent = begin.topLeftCorner(n, phase.moving ? unknowns_ : n);
-    from.jerk_tangent = phase.moving ? jerk_slope(s) : MatrixXd();
-    FilterStates filter_tangents = filters_at(begin);
-    NonlinearResponse response = follow(lin.system, lin.step, theta, from, s.length(), Partials::none);
-    if (!response.finite) return false;
-    if (lin.noise) {  // there is one phase
-      MatrixXd right = measured_.topRows(last_sample_) - response.output;
-      for (Index c = 0; c < measured_.cols(); ++c) right.col(c) += response.tangent[static_cast<std::size_t>(c)] * (start * linear);
-      lin.settle_white(*this, start, std::move(response.tangent), right);
-      return true;
+  lin.linked = !lin.noise && motion_prior_.rows() == 0;
+  MatrixXd begin(0, last);
+  VectorXd state;  // of the links, as `linear` has it
+  for (std::size_t p = 0; p < count; ++p) {
+    const Piece& piece = pieces_[p];
+    const Splines& splines = piece.splines;
+    const Interval s = counted(piece.samples);
+    const bool moved = has_state(piece, start);
+    if (p == 0 && moved) {
+      begin = MatrixXd::Zero(with_filters + level, last);
+      begin.topRows(with_filters) = start.middleCols(first_state_, last);
+      state = begin * linear.tail(last);
     }
-    for (Index c = 0; c < measured_.cols(); ++c) {
-      const auto channel = static_cast<std::size_t>(c);
-      const auto w = weight_.col(c).segment(s.first, s.length());
-      MatrixXd tangent = MatrixXd::Zero(s.length(), begin.cols());
-      tangent.leftCols(response.tangent[channel].cols()) = response.tangent[channel];
-      filter_outputs(channel, tangent, filter_tangents);
-      filter_outputs(channel, response.output.col(c), filters);
-      run_rows::Block block{s, phase.moving, c, start, std::move(tangent), s.last};
-      VectorXd y = readings().col(c).segment(s.first, s.length()) - response.output.col(c);  // beside the offset, which stays linear
-      MatrixXd reach;
-      if (phase.moving) {
-        y += block.rows * linear;
-        block.rows.col(first_offset_ + c).setOnes();
-        reach = w.asDiagonal() * block.rows;
-      } else {
-        y += block.rows * (start * linear);
-        reach = block.rotate_rows(w, first_offset_ + c);
+    const Index states = moved || !piece.moving ? with_filters : 0, acting = piece.moving && s.length() > 0 ? splines_in(s).all() : 0;
+    VectorXd at(states + acting);  // what tangents are taken in, as `linear` has it
+    at.head(states) = moved ? VectorXd(state.head(states)) : VectorXd::Zero(states);
+    at.tail(acting) = linear.segment(splines.still, acting);
+    MatrixXd end = MatrixXd::Zero(with_filters, at.size());
+    std::vector<MatrixXd> of_link, of_right;
+    if (s.length() > 0) {
+      drive_over(s, piece.moving, jerk, inputs_, from);
+      MatrixXd tangents = MatrixXd::Zero(with_filters, at.size());
+      tangents.leftCols(states).setIdentity();
+      from.start_tangent = tangents.topRows(n);
+      from.jerk_tangent = MatrixXd();
+      if (piece.moving) {
+        from.jerk_tangent = MatrixXd::Zero(s.length(), at.size());
+        from.jerk_tangent.rightCols(acting) = jerk_slope(s);
       }
-      run_rows::Rotated rotated;
-      block.rotate(s, w.cwiseProduct(y), rotated);
-      MatrixXd together(reach.rows(), unknowns_ + 1);
-      together << reach, block.reached(rotated);
-      for (const MatrixXd& others : rotated.others) unreachable += others.squaredNorm();
-      rows.push_back(std::move(together));
-      lin.blocks.push_back(std::move(block));
+      FilterStates filter_tangents = filters_at(tangents);
+      NonlinearResponse response = follow(lin.system, lin.step, theta, from, s.length(), Partials::none);
+      if (!response.finite) return false;
+      if (lin.noise) {  // there is one piece
+        MatrixXd left = measured_.topRows(last_sample_) - response.output;
+        for (Index c = 0; c < measured_.cols(); ++c) left.col(c) += response.tangent[static_cast<std::size_t>(c)] * at;
+        lin.settle_white(*this, start, std::move(response.tangent), left);
+        return true;
+      }
+      for (Index c = 0; c < measured_.cols(); ++c) {
+        const auto channel = static_cast<std::size_t>(c);
+        const auto w = weight_.col(c).segment(s.first, s.length());
+        MatrixXd& tangent = response.tangent[channel];
+        filter_outputs(channel, tangent, filter_tangents);
+        filter_outputs(channel, response.output.col(c), filters);
+        const VectorXd y = readings().col(c).segment(s.first, s.length()) - response.output.col(c) + tangent * at;  // beside the offset, which stays linear
+        run_rows::Block block{s, piece.moving, c, start, std::move(tangent), s.last};
+        if (piece.moving) {
+          const MatrixXd weighted = w.asDiagonal() * block.rows;
+          MatrixXd of_splines = MatrixXd::Zero(s.length(), splines.all());
+          of_splines.leftCols(acting) = weighted.rightCols(acting);
+          of_link.push_back(link_rows(piece, moved, of_splines, weighted.leftCols(states), w, first_offset_ + c));
+        } else {
+          const MatrixXd span = block.rotate_rows(w);
+          of_link.push_back(link_rows(piece, moved, {}, moved ? MatrixXd(span.leftCols(states)) : MatrixXd(), span.rightCols(1), first_offset_ + c));
+        }
+        run_rows::Rotated rotated;
+        block.rotate(s, w.cwiseProduct(y), rotated);
+        of_right.push_back(block.reached(rotated));
+        for (const MatrixXd& others : rotated.others) unreachable += others.squaredNorm();
+        lin.blocks.push_back(std::move(block));
+        if (lin.linked) continue;
+        rows.emplace_back(of_link.back().rows(), unknowns_ + 1);
+        rows.back() << over_c(piece, moved, of_link.back(), start), of_right.back();
+      }
+      end.topRows(n) = response.end_tangent;
+      Index row = n;
+      for (const MatrixXd& of_filter : filter_tangents) end.middleRows(row, of_filter.rows()) = of_filter, row += of_filter.rows();
+      from.start = response.end;
     }
-    from.start = response.end;
-    MatrixXd end = MatrixXd::Zero(with_filters, begin.cols());
-    end.topLeftCorner(n, response.end_tangent.cols()) = response.end_tangent;
-    Index row = n;
-    for (const MatrixXd& states : filter_tangents) end.middleRows(row, states.rows()) = states, row += states.rows();
-    start = phase.moving ? end : MatrixXd(end * start);
+    if (!angle_rows_.empty()) {
+      const MatrixXd& angle = angle_rows_[p];
+      of_link.push_back(link_rows(piece, moved, angle.leftCols(splines.all() + 1), {}, angle.middleCols(splines.all() + 1, 1), angle_offset_));
+      of_right.push_back(angle.rightCols(1));
+    }
+    links[p] = {splines.begin, splines.own(), stacked(of_link, of_link.front().cols()), {}};
+    right[p] = stacked(of_right, 1);
+    if (p + 1 == count) break;
+    const Splines& next = pieces_[p + 1].splines;
+    const Index own = splines.own(), open = splines.open();
+    if (moved || splines.end > 0) {
+      const auto place = [&](Index spline) { return spline >= splines.begin ? spline - splines.begin : own + with_filters + 1 + spline - splines.still; };
+      MatrixXd moves = MatrixXd::Zero(with_filters + 1 + next.open(), own + (moved ? with_filters + 1 + open : 0));
+      if (moved) moves.block(0, own, with_filters, states) = end.leftCols(states), moves(with_filters, own + with_filters) = 1;
+      for (Index j = 0; j < acting; ++j) moves.col(place(splines.still + j)).head(with_filters) = end.col(states + j);
+      for (Index j = splines.still; j < next.still; ++j) moves(with_filters, place(j)) = motion_.columns()[static_cast<std::size_t>(j)].tail;
+      for (Index j = next.still; j < next.begin; ++j) moves(with_filters + 1 + j - next.still, place(j)) = 1;
+      VectorXd before(own + state.size());
+      before << linear.segment(splines.begin, own), state;
+      state = moves * before;
+      links[p].transition = std::move(moves);
+    }
+    MatrixXd behind = states > 0 ? product(end.leftCols(states), start) : MatrixXd::Zero(with_filters, unknowns_);
+    behind.middleCols(splines.still, acting) += end.rightCols(acting);
+    start = std::move(behind);
   }
-  rows.insert(rows.end(), angle_rows_.begin(), angle_rows_.end());
-  lin.settle(rows, unknowns_, unreachable);
+  if (!lin.linked) {
+    rows.push_back(angle_rows());
+    lin.settle(rows, unknowns_, unreachable);
+    return true;
+  }
+  const MatrixXd held = held_rows();
+  auto chain = std::make_unique<run_rows::ChainEliminator>(std::move(links), unknowns_, std::move(begin), unknowns_ - first_offset_, held.middleCols(first_state_, last));
+  const run_rows::ChainEliminator::Rotated found = chain->rotated(std::move(right), held.rightCols(1));
+  lin.settle(std::move(chain), found, unreachable);
   return true;
 }
 
@@ -183,7 +244,7 @@ RunResidual::NonlinearPoint RunResidual::first_nonlinear_point(const Linearised&
 
 /// c from the angle channel alone.
 VectorXd RunResidual::as_the_angle_says() const {
-  const MatrixXd rows = run_rows::stacked(angle_rows_, unknowns_ + 1);
+  const MatrixXd rows = angle_rows();
   const run_rows::Eliminator angle(rows.leftCols(unknowns_));
   return angle.solve(angle.rotated(rows.rightCols(1)));
 }
@@ -262,7 +323,7 @@ bool RunResidual::search_along_tangents(Linearised& lin, const VectorXd& theta, 
     lin.chi2 = point.chi2;
     near = promised < much * point.chi2;
     if (!worth_going_on(promised, point.chi2)) return true;
-    const auto damped = [&] { return damping > 0 ? run_rows::damped_step(lin.eliminate->factor(), step, damping) : step; };
+    const auto damped = [&] { return damping > 0 ? lin.eliminate->damped_step(step, damping) : step; };
     NonlinearPoint next = nonlinear_point(lin, theta, point.linear + damped());
     while (!(next.chi2 < point.chi2) && damping < most_damping) {
       damping = std::max(least_damping, growth * damping);
@@ -288,10 +349,10 @@ void RunResidual::follow_nonlinear_partials(const LinearSystem& system, const Ve
   start.col(parameters) = initial_state(linear, start.rows());
   FilterStates filters = filters_at(start);
   std::size_t block = 0;
-  for (const MotionBasis::Phase& phase : phases_) {
-    const Interval s = counted(phase);
+  for (const Piece& piece : pieces_) {
+    const Interval s = counted(piece.samples);
     if (s.length() <= 0) break;
-    drive_over(s, phase.moving, jerk, inputs_, from);
+    drive_over(s, piece.moving, jerk, inputs_, from);
     const NonlinearResponse response = follow(system, step, theta, from, s.length(), Partials::all);
     for (Index c = 0; c < measured_.cols(); ++c) {
       MatrixXd m(s.length(), parameters + 1);
@@ -345,7 +406,7 @@ RunResidual::SideBySide RunResidual::side_by_side(const VectorXd& theta, const V
   MatrixXd left = readings().topRows(samples) - response.output;
   left.rowwise() -= linear.segment(first_offset_, channels).transpose();
   left.array() *= weight_.topRows(samples).array();
-  const MatrixXd known = run_rows::stacked(angle_rows_, unknowns_ + 1);  // of the noise's own state
+  const MatrixXd known = angle_rows();  // of the noise's own state
   const VectorXd off = known.col(unknowns_) - known.leftCols(unknowns_) * linear;
   result.chi2 = left.squaredNorm() + off.squaredNorm();
   if (!slopes) return result;

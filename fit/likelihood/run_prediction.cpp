@@ -19,7 +19,9 @@ RunResidual::Prediction RunResidual::predict(const VectorXd& theta) const {
   p.channels = channels_;
   const bool finite = std::isfinite(solution.chi2);  // else the model runs away from wherever c was looked for
   p.linear = finite ? solution.linear : (motion_.unknowns() > 0 ? as_the_angle_says() : VectorXd::Zero(unknowns_));
-  p.linear_factor = finite ? lin.eliminate->factor() : MatrixXd::Zero(unknowns_, unknowns_);
+  const Index behind = unknowns_ - motion_.unknowns();
+  p.factor_behind_motion = MatrixXd::Zero(behind, behind);
+  if (finite) p.factor_behind_motion = lin.eliminate->last_factor().bottomRightCorner(behind, behind);
   p.offset = p.linear.segment(first_offset_, measured_.cols());
   p.initial_state = p.linear.segment(first_state_, static_cast<Index>(free_.size()));
   if (angle_offset_ >= 0) p.angle_offset = p.linear.segment(angle_offset_, 1);
@@ -63,20 +65,19 @@ MatrixXd RunResidual::Linearised::response(const RunResidual& run, const LinearS
 void RunResidual::add_prediction_slope(const Linearised& lin, const run_rows::Block& block, const MatrixXd& linear_slope, MatrixXd& slope) const {
   const Interval& s = block.samples;
   auto own = slope.middleRows(s.first, s.length());
-  if (block.moving && block.rows.size() > 0) {  // the offset is among the columns
-    own += block.rows * linear_slope;
-    return;
-  }
   const MatrixXd offsets = lin.offset_columns(block.channel, s);
   own += offsets * linear_slope.middleRows(lin.offsets_from(*this, block.channel), offsets.cols());
   MatrixXd state = block.start.leftCols(unknowns_) * linear_slope;
   if (block.rows.size() > 0) {
-    own += block.rows * state;
+    const Splines splines = splines_in(s);
+    const Index acting = block.moving ? splines.all() : 0, states = block.rows.cols() - acting;
+    own += block.rows.leftCols(states) * state.topRows(states) + block.rows.rightCols(acting) * linear_slope.middleRows(splines.still, acting);
     return;
   }
   const MatrixXd& free = lin.free[static_cast<std::size_t>(block.channel)].rows;
   if (block.moving) {
-    own += motion_output_columns(lin, block.channel, s) * linear_slope.topRows(motion_.unknowns()) + free.topRows(s.length()) * state;
+    const Splines splines = splines_in(s);
+    own += motion_output_columns(lin, block.channel, s, splines) * linear_slope.middleRows(splines.still, splines.all()) + free.topRows(s.length()) * state;
     return;
   }
   for (Index first = 0; first < s.length(); first += rest_rows::stretch_samples, state = lin.leap * state) {
@@ -133,7 +134,11 @@ RunResidual::Sensitivity RunResidual::sensitivity(const VectorXd& theta) const {
 
 RunResidual::Levels RunResidual::levels(const Solution& solution) const {
   const Index count = unknowns_ - first_offset_;  // they come last
-  return {solution.linear.tail(count), solution.model->eliminate->factor().bottomRightCorner(count, count)};
+  return {solution.linear.tail(count), solution.model->eliminate->last_factor().bottomRightCorner(count, count)};
+}
+
+MatrixXd RunResidual::linear_factor(const Solution& solution) const {
+  return std::isfinite(solution.chi2) ? solution.model->eliminate->factor() : MatrixXd::Zero(unknowns_, unknowns_);
 }
 
 MatrixXd RunResidual::linear_rows(const VectorXd& theta) const {
@@ -142,7 +147,7 @@ MatrixXd RunResidual::linear_rows(const VectorXd& theta) const {
   const Solution solution = free.solve(theta);
   if (!std::isfinite(solution.chi2)) return {};
   MatrixXd rows(unknowns_, unknowns_ + 1);
-  const MatrixXd factor = solution.model->eliminate->factor();
+  const MatrixXd factor = free.linear_factor(solution);
   rows << factor, factor * solution.linear;
   return rows;
 }

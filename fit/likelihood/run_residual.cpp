@@ -80,7 +80,7 @@ std::vector<Interval> moving_softly(const VectorXd& angle, double sigma) {
 
 }  // namespace
 
-// Steps need a knot on every sample: 560 of them, four steps in a record, are corrected in 3 s. A motion that goes on and on has to do with fewer.
+// Steps need a knot on every sample: 560 of them, four steps in a record, are corrected in 3 s. With a prior on the motion the cost goes with the cube: what goes on and on has to do with fewer.
 Eigen::Index most_knots(std::size_t windows) { return windows > 1 ? 600 : 400; }
 
 namespace {
@@ -118,6 +118,56 @@ std::vector<MotionBasis::Window> motion_windows(const Run& run) {
   for (const auto& w : windows) total += w.knots.length();
   const Index stride = 1 + total / (most_knots(windows.size()) + 1);
   join_short(windows, stride);
+  for (auto& w : windows) w.stride = stride;
+  return windows;
+}
+
+namespace {
+
+/// An angle without its spikes, and its noise.
+struct Angle {
+  VectorXd value;
+  double sigma = 0;
+};
+
+Angle without_spikes(const Run& run, const std::vector<MotionBasis::Window>& windows) {
+  Angle angle{run.channel("alpha").value};
+  angle.sigma = noise_level(angle.value);
+  std::vector<Interval> moves;
+  for (const MotionBasis::Window& window : windows) moves.push_back(window.knots);
+  const std::vector<bool> spike = isolated_spikes(angle.value, angle.sigma, moves);
+  for (Index k = 0; k < angle.value.size(); ++k)
+    if (spike[static_cast<std::size_t>(k)]) angle.value[k] = std::nan("");
+  return angle;
+}
+
+double off_its_knots(const Angle& angle, const std::vector<MotionBasis::Window>& windows, Index stride) {
+  const VectorXd& x = angle.value;
+  const double gain = std::sqrt(1 + (1 + 81 + 81 + 1) / 256.0);
+  const Index half = (stride + 1) / 2;
+  double squares = 0, count = 0;
+  for (const MotionBasis::Window& window : windows)
+    for (Index k = std::max(window.knots.first, 3 * half); k < window.knots.last && k + 3 * half < x.size(); ++k) {
+      const double off = x[k] - (9 * (x[k - half] + x[k + half]) - x[k - 3 * half] - x[k + 3 * half]) / 16;
+      if (std::isfinite(off)) squares += off * off, ++count;
+    }
+  return count > 0 ? std::sqrt(squares / count) / (gain * angle.sigma) : 0;
+}
+
+}  // namespace
+
+double off_its_knots(const Run& run, const std::vector<MotionBasis::Window>& windows, Index stride) { return off_its_knots(without_spikes(run, windows), windows, stride); }
+
+std::vector<MotionBasis::Window> windows_to_fit(const Run& run) {
+  std::vector<MotionBasis::Window> windows = motion_windows(run);
+  if (windows.empty() || windows.front().stride == 1) return windows;
+  const Angle angle = without_spikes(run, windows);
+  Index total = 0;
+  for (const auto& w : windows) total += w.knots.length();
+  // More than chance: three standard deviations of the mean of so many squares, of differences that have samples in common (sum of their squared correlations below 3), and of the noise level alike.
+  const double followed = std::sqrt(1 + 3 * std::sqrt(12 / static_cast<double>(total)));
+  Index stride = windows.front().stride;
+  while (stride > 1 && total / (stride - 1) <= most_knots_to_fit && off_its_knots(angle, windows, stride) > followed) --stride;
   for (auto& w : windows) w.stride = stride;
   return windows;
 }
@@ -172,6 +222,7 @@ RunResidual::RunResidual(const AeroelasticModel& model, const Run& run, std::vec
   }
   inputs_ = run_inputs(run, conditions_);
   phases_ = motion_.phases();
+  cut_phases();
 
   // A step starts in the steady state of its first angle; everything else starts anyhow.
   const LinearSystem system = model.system(conditions_, model.start_values(), channels_);
@@ -202,57 +253,95 @@ Index RunResidual::observations() const {
 
 Index RunResidual::degrees_of_freedom() const { return observations() - unknowns_; }
 
-/// Rows [c | angle] of the angle channel. Where the angle is constant all rows are alike and are one row with their common weight, besides a
-/// row for their scatter.
+/// Long motions in pieces of so many knots, which the elimination takes one by one.
+void RunResidual::cut_phases() {
+  constexpr Index knots = 32;
+  Index stride = 1;
+  for (const MotionBasis::Window& window : motion_.windows()) stride = std::max(stride, window.stride);
+  pieces_.clear();
+  for (const MotionBasis::Phase& phase : phases_) {
+    const Index length = phase.samples.length(), count = phase.moving ? std::max<Index>(1, length / (knots * stride)) : 1, each = (length + count - 1) / count;
+    for (Index first = phase.samples.first; first < phase.samples.last; first += each) {
+      const Interval samples{first, std::min(first + each, phase.samples.last)};
+      pieces_.push_back({samples, phase.moving, phase.moving && samples.last == phase.samples.last, splines_in(samples)});
+    }
+  }
+}
+
+/// The first spline that does not stand still before a sample.
+Index RunResidual::first_open(Index at) const {
+  const std::vector<MotionBasis::Column>& columns = motion_.columns();
+  const auto still = [&](const MotionBasis::Column& column) { return column.first + column.value.size() + 3 <= at; };
+  return std::find_if_not(columns.begin(), columns.end(), still) - columns.begin();
+}
+
+RunResidual::Splines RunResidual::splines_in(const Interval& samples) const {
+  const auto begins_before = [](const MotionBasis::Column& column, Index sample) { return column.first < sample; };
+  const auto place = [&](Index sample) { return std::lower_bound(motion_.columns().begin(), motion_.columns().end(), sample, begins_before) - motion_.columns().begin(); };
+  return {first_open(samples.first), place(samples.first), place(samples.last)};
+}
+
+/// Rows of the angle channel. Where the angle is constant all rows are alike and are one row with their common weight, besides a row for their scatter.
 void RunResidual::prepare_angle_rows() {
   forget_solutions();
   angle_rows_.clear();
-  if (motion_prior_.rows() > 0) angle_rows_.push_back(motion_prior_);
-  add_colour_rows();
   if (angle_offset_ < 0) return;
-  for (const MotionBasis::Phase& phase : phases_) {
-    const Interval& s = phase.samples;
+  for (const Piece& piece : pieces_) {
+    const Interval& s = piece.samples;
     const auto w = angle_weight_.segment(s.first, s.length());
     const auto y = angle_.segment(s.first, s.length());
-    if (phase.moving) {
-      angle_rows_.push_back(angle_rows_in_motion(s));
+    if (piece.moving) {
+      MatrixXd span(s.length(), piece.splines.all() + 3);
+      span << motion_.angle_columns(s, piece.splines.still, piece.splines.end), VectorXd::Ones(s.length()), VectorXd::Ones(s.length()), y;
+      span = w.asDiagonal() * span;
+      if (span.rows() > 2 * span.cols()) span = run_rows::compress(std::move(span));
+      angle_rows_.push_back(std::move(span));
       continue;
     }
-    const double total = w.squaredNorm();
-    if (total == 0) continue;
-    const double mean = w.cwiseAbs2().dot(y) / total, root = std::sqrt(total);
-    MatrixXd rows = MatrixXd::Zero(2, unknowns_ + 1);
-    rows.row(0).head(motion_.unknowns()) = root * motion_.angle_columns({s.first, s.first + 1});
-    rows(0, angle_offset_) = root;
-    rows(0, unknowns_) = root * mean;
-    rows(1, unknowns_) = std::sqrt((w.array() * (y.array() - mean)).square().sum());
+    const double total = w.squaredNorm(), root = std::sqrt(total), mean = total > 0 ? w.cwiseAbs2().dot(y) / total : 0;
+    MatrixXd rows(2, 3);
+    rows << root, root, root * mean, 0, 0, std::sqrt((w.array() * (y.array() - mean)).square().sum());
     angle_rows_.push_back(std::move(rows));
   }
-  MatrixXd all = run_rows::stacked(angle_rows_, unknowns_ + 1);
-  if (all.rows() > 2 * all.cols()) angle_rows_ = {run_rows::compress(std::move(all))};
 }
 
-/// Motion unknowns whose splines begin in these samples: the first of them, and how many.
-std::pair<Index, Index> RunResidual::splines_in(const Interval& samples) const {
-  const auto begins_before = [](const MotionBasis::Column& column, Index sample) { return column.first < sample; };
-  const auto place = [&](Index sample) { return std::lower_bound(motion_.columns().begin(), motion_.columns().end(), sample, begins_before) - motion_.columns().begin(); };
-  return {place(samples.first), place(samples.last) - place(samples.first)};
+/// d angle / d c of the splines that stand still before this one acts.
+Eigen::RowVectorXd RunResidual::level_before(Index spline) const {
+  Eigen::RowVectorXd level(spline);
+  for (Index j = 0; j < spline; ++j) level[j] = motion_.columns()[static_cast<std::size_t>(j)].tail;
+  return level;
 }
 
-/// Rows [c | angle] while the shaft moves: the splines that begin in these samples, beside the level that the earlier ones have led to.
-MatrixXd RunResidual::angle_rows_in_motion(const Interval& s) const {
-  const auto [first, count] = splines_in(s);
-  MatrixXd columns = motion_.angle_columns(s);
-  MatrixXd span(s.length(), count + 2);  // own splines, level, angle
-  span << columns.middleCols(first, count), VectorXd::Ones(s.length()), angle_.segment(s.first, s.length());
-  span = angle_weight_.segment(s.first, s.length()).asDiagonal() * span;
-  if (span.rows() > 2 * span.cols()) span = run_rows::compress(std::move(span));
-  MatrixXd rows = MatrixXd::Zero(span.rows(), unknowns_ + 1);
-  rows.leftCols(first) = span.col(count) * columns.row(0).head(first);
-  rows.middleCols(first, count) = span.leftCols(count);
-  rows.col(angle_offset_) = span.col(count);
-  rows.col(unknowns_) = span.col(count + 1);
-  return rows;
+/// [c | reading] of what is known of c beside the channels: the prior on the motion, and the noise's own state.
+MatrixXd RunResidual::held_rows() const { return run_rows::stacked({motion_prior_.rows() > 0 ? motion_prior_ : MatrixXd(0, unknowns_ + 1), colour_rows()}, unknowns_ + 1); }
+
+VectorXd RunResidual::held_residual(const VectorXd& linear) const {
+  const MatrixXd rows = held_rows();
+  return rows.col(unknowns_) - rows.leftCols(unknowns_) * linear;
+}
+
+/// [c | angle], all that is known of c beside the fitted channels.
+MatrixXd RunResidual::angle_rows() const {
+  std::vector<MatrixXd> all{held_rows()};
+  for (std::size_t p = 0; p < angle_rows_.size(); ++p) {
+    const Splines& splines = pieces_[p].splines;
+    const MatrixXd& own = angle_rows_[p];
+    MatrixXd rows = MatrixXd::Zero(own.rows(), unknowns_ + 1);
+    rows.leftCols(splines.still) = own.col(splines.all()) * level_before(splines.still);
+    rows.middleCols(splines.still, splines.all()) = own.leftCols(splines.all());
+    rows.col(angle_offset_) = own.col(splines.all() + 1);
+    rows.col(unknowns_) = own.col(splines.all() + 2);
+    all.push_back(std::move(rows));
+  }
+  return run_rows::stacked(all, unknowns_ + 1);
+}
+
+/// What c leaves of the angle in one piece.
+VectorXd RunResidual::angle_residual(std::size_t piece, const VectorXd& linear) const {
+  const Splines& splines = pieces_[piece].splines;
+  const MatrixXd& rows = angle_rows_[piece];
+  const double level = level_before(splines.still) * linear.head(splines.still);
+  return rows.col(splines.all() + 2) - rows.leftCols(splines.all()) * linear.segment(splines.still, splines.all()) - level * rows.col(splines.all()) - linear[angle_offset_] * rows.col(splines.all() + 1);
 }
 
 void RunResidual::weights_changed() {
@@ -274,7 +363,7 @@ void RunResidual::share_responses_with(RunResidual& other) {
 void RunResidual::set_motion_prior(const MatrixXd& rows) {
   motion_prior_ = MatrixXd::Zero(rows.rows(), unknowns_ + 1);
   if (rows.rows() > 0) motion_prior_.leftCols(unknowns_) = rows;
-  prepare_angle_rows();
+  forget_solutions();
 }
 
 void RunResidual::keep_noise_of(const RunResidual& other) {

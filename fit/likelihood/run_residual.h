@@ -1,5 +1,6 @@
 #pragma once
 #include <Eigen/Core>
+#include <algorithm>
 #include <cmath>
 #include <functional>
 #include <map>
@@ -41,6 +42,9 @@ struct RunOptions {
 /// With nonlinear effects at work the linear unknowns enter nonlinearly too, and c is searched for at every theta by Levenberg-Marquardt steps along exact
 /// tangents (core/propagate/nonlinear_response.h): n x n x (knots) a sample and step.
 ///
+/// Without such effects c is eliminated piece by piece, in time that goes with the record (fit/likelihood/chain_eliminator.h): a piece is a rest, or the samples of some 32 knots. A prior on the motion
+/// (set_motion_prior) holds knots far apart together: all of c is eliminated at once then, as it is where effects are nonlinear, and the cost goes with the cube of the knots.
+///
 /// Rests without jerk are compressed exactly: their rows span only the free response of the model, an n-dimensional space. Once its vibrations have died out
 /// (below 1e-11), a stretch of 1024 samples is looked at as the few numbers that a polynomial needs (fit/likelihood/rest_rows.h), so that a long rest costs next to nothing.
 class RunResidual {
@@ -56,7 +60,7 @@ class RunResidual {
     Eigen::MatrixXd jacobian;  ///< (P + 1) x P, empty for Partials::none
     Eigen::VectorXd linear;    ///< c
     Eigen::MatrixXd linear_slope;   ///< d c / d theta, empty for Partials::none
-    Eigen::MatrixXd linear_factor;  ///< R with R^T R the information matrix of c at fixed theta, empty for Partials::none
+    Eigen::MatrixXd linear_factor = {};  ///< R with R^T R the information matrix of c at fixed theta, where it was asked for (RunResidual::linear_factor), else empty
     DualMatrix departure;           ///< state behind the last sample, n x 1, of a linear model; with c following theta
   };
   Evaluation evaluate(const Eigen::VectorXd& theta, Partials partials) const;
@@ -83,7 +87,7 @@ class RunResidual {
   SideBySide side_by_side(const Eigen::VectorXd& theta, const Eigen::VectorXd& linear, Eigen::Index samples, Partials partials) const;
 
   /// The fitted channels over the whole record, at theta and the c that belongs to it. Where the model runs away from every c that was tried, `output` is not a
-  /// number, the motion is the angle's own, and `linear_factor` zero.
+  /// number, and the motion is the angle's own.
   struct Prediction {
     std::vector<std::string> channels;
     Eigen::MatrixXd output;        ///< samples x channels, offsets included
@@ -92,7 +96,7 @@ class RunResidual {
     Eigen::VectorXd offset;        ///< per channel
     Eigen::VectorXd initial_state; ///< empty where steady
     Eigen::VectorXd linear;        ///< c
-    Eigen::MatrixXd linear_factor; ///< R with R^T R = information matrix of c at fixed theta
+    Eigen::MatrixXd factor_behind_motion;  ///< R of what is known of the unknowns behind the motion's (initial state, offsets, angle before the motion), those of the motion eliminated, at fixed theta; else zero
   };
   Prediction predict(const Eigen::VectorXd& theta) const;
 
@@ -131,6 +135,8 @@ class RunResidual {
   };
   Sensitivity sensitivity(const Eigen::VectorXd& theta) const;
 
+  /// R, upper triangular, with R^T R the information matrix of c at fixed theta; zero where the model runs away. Its cost goes with the cube of the unknowns.
+  Eigen::MatrixXd linear_factor(const Solution& solution) const;
   /// The linear unknowns' least-squares problem at theta, triangularised: [R | q], R c = q, without any prior on the motion. Empty where the model runs away.
   Eigen::MatrixXd linear_rows(const Eigen::VectorXd& theta) const;
   /// Rows over c that are held against zero beside the data (motion_prior); they count in chi-square. Empty: none.
@@ -250,11 +256,25 @@ class RunResidual {
   const Eigen::VectorXd& angle_weight() const { return angle_weight_; }
 
  private:
+  /// Motion unknowns whose splines act in some samples: [still, begin) begin before them, [begin, end) in them.
+  struct Splines {
+    Eigen::Index still = 0, begin = 0, end = 0;
+    Eigen::Index open() const { return begin - still; }
+    Eigen::Index own() const { return end - begin; }
+    Eigen::Index all() const { return end - still; }
+  };
+  /// A phase, or some samples of a long motion: what one link of the elimination stands for.
+  struct Piece {
+    Interval samples;
+    bool moving = false;
+    bool stands_still = false;  ///< the shaft, behind it
+    Splines splines;
+  };
   std::shared_ptr<Linearised> linearise(const Eigen::VectorXd& theta) const;
   void weights_changed();
   void lay_out();
   void take_colour(const RunResidual& other);
-  void add_colour_rows();
+  Eigen::MatrixXd colour_rows() const;
   void filter_output(LinearSystem& system, ExactStep& step) const;
   using FilterStates = std::vector<Eigen::MatrixXd>;
   Eigen::Index filter_states() const;
@@ -281,7 +301,7 @@ class RunResidual {
   void search_from_the_beginning(Linearised& lin, const Eigen::VectorXd& theta) const;
   void add_prediction_slope(const Linearised& lin, const run_rows::Block& block, const Eigen::MatrixXd& linear_slope, Eigen::MatrixXd& slope) const;
   void prepare_linear(Linearised& lin) const;
-  Eigen::Index longest_phase(bool moving) const;
+  Eigen::Index longest_piece(bool moving) const;
   Eigen::Index samples_of_free_response() const;
   using TakeRows = std::function<void(std::size_t block, const Interval& samples, Eigen::MatrixXd rows)>;
   DualMatrix follow_partials(const Eigen::VectorXd& theta, const Eigen::VectorXd& linear, const std::vector<run_rows::Block>& blocks, const TakeRows& take) const;
@@ -289,20 +309,31 @@ class RunResidual {
   Eigen::MatrixXd jerk_slope(const Interval& samples) const;
   LinearSystem searched_system(const Eigen::VectorXd& theta) const;
   LinearSystem differentiable_system(const Eigen::VectorXd& theta, const std::vector<Eigen::Index>& parameters) const;
-  Eigen::MatrixXd motion_state_columns(const Linearised& lin, const Interval& samples) const;
-  Eigen::MatrixXd state_behind(const Linearised& lin, const MotionBasis::Phase& phase, const Interval& samples, const Eigen::MatrixXd& start) const;
+  void cut_phases();
+  Splines splines_in(const Interval& samples) const;
+  Eigen::Index first_open(Eigen::Index at) const;
+  Eigen::VectorXd motion_state(const Linearised& lin, Eigen::Index spline, Eigen::Index at) const;
+  Eigen::MatrixXd state_behind(const Linearised& lin, const Piece& piece, const Interval& samples, const Eigen::MatrixXd& leap, const Eigen::MatrixXd& start) const;
+  Eigen::MatrixXd transition(const Linearised& lin, const Piece& piece, bool has_state, const Splines& next, const Eigen::MatrixXd& leap) const;
+  Eigen::RowVectorXd level_before(Eigen::Index spline) const;
+  std::size_t counted_pieces() const;
+  bool has_state(const Piece& piece, const Eigen::MatrixXd& start) const { return piece.splines.begin > 0 || !start.isZero(0); }
+  Eigen::MatrixXd link_rows(const Piece& piece, bool has_state, const Eigen::MatrixXd& acting, const Eigen::MatrixXd& states, const Eigen::MatrixXd& shared, Eigen::Index first_shared) const;
+  Eigen::MatrixXd over_c(const Piece& piece, bool has_state, const Eigen::MatrixXd& rows, const Eigen::MatrixXd& start) const;
   Eigen::Index smooth_from(const Linearised& lin, const Interval& samples, const Eigen::MatrixXd& start) const;
-  Eigen::MatrixXd reach_at_rest(const Linearised& lin, run_rows::Block& block) const;
-  Eigen::MatrixXd reach_in_motion(const Linearised& lin, run_rows::Block& block) const;
-  std::pair<Eigen::Index, Eigen::Index> splines_in(const Interval& samples) const;
+  Eigen::MatrixXd rows_at_rest(const Linearised& lin, const Piece& piece, bool has_state, run_rows::Block& block) const;
+  Eigen::MatrixXd rows_in_motion(const Linearised& lin, const Piece& piece, bool has_state, run_rows::Block& block) const;
   run_rows::Rotated rotated_readings(const Linearised& lin, const run_rows::Block& block, double& beside) const;
   const rest_rows::SmoothReadings& smooth_readings(Eigen::Index channel, const Interval& stretch) const;
-  Interval counted(const MotionBasis::Phase& phase) const;
-  Eigen::MatrixXd motion_output_columns(const Linearised& lin, Eigen::Index channel, const Interval& samples) const;
+  Interval counted(const Interval& samples) const { return {samples.first, std::min(samples.last, last_sample_)}; }
+  Eigen::MatrixXd motion_output_columns(const Linearised& lin, Eigen::Index channel, const Interval& samples, const Splines& splines) const;
+  Eigen::MatrixXd angle_rows() const;
+  Eigen::VectorXd angle_residual(std::size_t piece, const Eigen::VectorXd& linear) const;
+  Eigen::MatrixXd held_rows() const;
+  Eigen::VectorXd held_residual(const Eigen::VectorXd& linear) const;
   Eigen::VectorXd initial_state(const Eigen::VectorXd& linear, Eigen::Index states) const;
   double arrival_angle(const LinearSystem& system) const { return arrival_.rows() > 0 ? arrival_.value(system.motion, 0) : 0; }
   void prepare_angle_rows();
-  Eigen::MatrixXd angle_rows_in_motion(const Interval& samples) const;
 
   const AeroelasticModel* model_;
   const Run* run_;
@@ -310,6 +341,7 @@ class RunResidual {
   std::vector<std::string> channels_;
   MotionBasis motion_;
   std::vector<MotionBasis::Phase> phases_;
+  std::vector<Piece> pieces_;
   Eigen::MatrixXd measured_;  ///< samples x channels, missing samples 0
   Eigen::MatrixXd weight_;    ///< 1 / sigma, 0 where left out
   std::vector<double> sigma_;
@@ -325,7 +357,7 @@ class RunResidual {
   std::shared_ptr<SharedResponses> shared_;
   DualMatrix arrival_;            ///< empty where the run begins of its own
   Eigen::MatrixXd motion_prior_;  ///< [c | 0]
-  std::vector<Eigen::MatrixXd> angle_rows_;  ///< [c | angle], weighted; they do not depend on theta
+  std::vector<Eigen::MatrixXd> angle_rows_;  ///< by piece, weighted, [splines that act in it | level of the earlier ones | angle before the motion | angle]; they do not depend on theta
   std::vector<Eigen::Index> differentiated_;
   Eigen::MatrixXd inputs_;  ///< samples + 1 rows
   mutable std::map<std::pair<Eigen::Index, Eigen::Index>, rest_rows::SmoothReadings> smooth_readings_;  ///< by channel and first sample, where they were asked for
@@ -356,10 +388,18 @@ class RunResidual {
   Eigen::Index first_state_ = 0, first_offset_ = 0, angle_offset_ = -1;
 };
 
-/// Knots of a motion in so many windows, at most; more samples make them sparser. The cost goes with their square.
+/// Knots of a motion in so many windows, at most; more samples make them sparser.
 Eigen::Index most_knots(std::size_t windows);
 
 /// Windows in which the shaft of a run moves, from its angle channel, with room before and after; empty for runs without prescribed pitch.
 std::vector<MotionBasis::Window> motion_windows(const Run& run);
+
+/// The same for a fit, whose cost goes with the knots alone: as close as the angle shows that it needs them (off_its_knots), `most_knots_to_fit` at most.
+std::vector<MotionBasis::Window> windows_to_fit(const Run& run);
+constexpr Eigen::Index most_knots_to_fit = 2000;
+
+/// Root mean square of how far the angle lies, in these windows, from the cubic through the samples half and three halves of `stride` away, over what its noise makes of that: 1 where knots so
+/// far apart follow the motion. 0 where there is no such sample.
+double off_its_knots(const Run& run, const std::vector<MotionBasis::Window>& windows, Eigen::Index stride);
 
 }  // namespace unrig

@@ -27,21 +27,25 @@ VectorXd RunResidual::initial_state(const VectorXd& linear, Index states) const 
   return state;
 }
 
-Interval RunResidual::counted(const MotionBasis::Phase& phase) const { return {phase.samples.first, std::min(phase.samples.last, last_sample_)}; }
-
-Index RunResidual::longest_phase(bool moving) const {
+Index RunResidual::longest_piece(bool moving) const {
   Index longest = 0;
-  for (const MotionBasis::Phase& s : phases_)
-    if (s.moving == moving) longest = std::max(longest, counted(s).length());
+  for (const Piece& piece : pieces_)
+    if (piece.moving == moving) longest = std::max(longest, moving ? piece.samples.length() : counted(piece.samples).length());
   return longest;
 }
 
 void RunResidual::Linearised::settle(const std::vector<MatrixXd>& rows, Index unknowns, double unreachable) {
   const MatrixXd stack = stacked(rows, unknowns + 1);
-  eliminate = std::make_unique<run_rows::Eliminator>(stack.leftCols(unknowns));
-  const MatrixXd rotated = eliminate->rotated(stack.rightCols(1));
-  linear = eliminate->solve(rotated);
-  chi2 = unreachable + rotated.bottomRows(rotated.rows() - eliminate->rank()).squaredNorm();
+  auto whole = std::make_unique<run_rows::ChainEliminator>(std::vector<run_rows::Link>{}, unknowns, MatrixXd(0, unknowns), unknowns, stack.leftCols(unknowns));
+  const run_rows::ChainEliminator::Rotated right = whole->rotated({}, stack.rightCols(1));
+  settle(std::move(whole), right, unreachable);
+}
+
+void RunResidual::Linearised::settle(std::unique_ptr<run_rows::ChainEliminator> chain, const run_rows::ChainEliminator::Rotated& right, double unreachable) {
+  eliminate = std::move(chain);
+  linear = eliminate->solve(right);
+  chi2 = unreachable;
+  for (const MatrixXd& beside : right.beside) chi2 += beside.squaredNorm();
 }
 
 std::shared_ptr<RunResidual::Linearised> RunResidual::linearise(const VectorXd& theta) const {
@@ -66,7 +70,7 @@ std::shared_ptr<RunResidual::Linearised> RunResidual::linearise(const VectorXd& 
   return lin;
 }
 
-Index RunResidual::samples_of_free_response() const { return std::max(std::min(longest_phase(false), rest_rows::stretch_samples), longest_phase(true)); }
+Index RunResidual::samples_of_free_response() const { return std::max(std::min(longest_piece(false), rest_rows::stretch_samples), longest_piece(true)); }
 
 /// Responses that the rows of a linear system are made of.
 void RunResidual::prepare_linear(Linearised& lin) const {
@@ -78,58 +82,115 @@ void RunResidual::prepare_linear(Linearised& lin) const {
   }
   lin.polynomials = inputs_.cols() == 0 && !lin.wandering;
   if (motion_.unknowns() > 0) {
-    lin.spline = spline_states(lin.step, longest_phase(true) + 1);
+    Index support = 0;
+    for (const MotionBasis::Column& column : motion_.columns()) support = std::max<Index>(support, column.value.size() + 3);
+    lin.spline = spline_states(lin.step, longest_piece(true) + support + 1);
     lin.spline_summed = lin.spline;
     for (Index k = 1; k < lin.spline.cols(); ++k) lin.spline_summed.col(k) += lin.spline_summed.col(k - 1);
+    lin.spline_output = product(lin.system.C.value, lin.spline);
+    lin.spline_summed_output = product(lin.system.C.value, lin.spline_summed);
   }
 }
 
-/// d output / d motion unknowns over a phase in which the shaft moves, of the splines that begin in it: the response to one spline, shifted.
-MatrixXd RunResidual::motion_output_columns(const Linearised& lin, Index channel, const Interval& samples) const {
-  const RowVectorXd unit = lin.system.C.value.row(channel) * lin.spline, summed = lin.system.C.value.row(channel) * lin.spline_summed;
-  MatrixXd columns = MatrixXd::Zero(samples.length(), motion_.unknowns());
-  for (Index j = 0; j < motion_.unknowns(); ++j) {
-    const MotionBasis::Column& column = motion_.columns()[static_cast<std::size_t>(j)];
-    if (column.first < samples.first) continue;
-    const auto add = [&](const RowVectorXd& response, Index knot, double amount) {
-      const Index from = knot + 1;
-      if (amount == 0 || from >= samples.last) return;
-      columns.col(j).tail(samples.last - from) += amount * response.segment(1, samples.last - from).transpose();
+/// d output / d motion unknowns over samples in which the shaft moves, of the splines that act in them: the response to one spline, shifted.
+MatrixXd RunResidual::motion_output_columns(const Linearised& lin, Index channel, const Interval& samples, const Splines& splines) const {
+  MatrixXd columns = MatrixXd::Zero(samples.length(), splines.all());
+  for (Index j = 0; j < columns.cols(); ++j) {
+    const MotionBasis::Column& column = motion_.columns()[static_cast<std::size_t>(splines.still + j)];
+    const auto add = [&](const MatrixXd& response, Index knot, double amount) {
+      const Index from = std::max(knot + 1, samples.first), count = samples.last - from;
+      if (amount == 0 || count <= 0) return;
+      columns.col(j).tail(count) += amount * response.row(channel).segment(from - knot, count).transpose();
     };
-    for (Index i = 0; i < column.value.size(); ++i) add(unit, column.first + i, column.value[i]);
-    add(summed, column.first + column.value.size(), column.tail);
+    for (Index i = 0; i < column.value.size(); ++i) add(lin.spline_output, column.first + i, column.value[i]);
+    add(lin.spline_summed_output, column.first + column.value.size(), column.tail);
   }
   return columns;
 }
 
-/// d state / d motion unknowns behind such a phase, of the same splines.
-MatrixXd RunResidual::motion_state_columns(const Linearised& lin, const Interval& samples) const {
-  MatrixXd columns = MatrixXd::Zero(lin.spline.rows(), motion_.unknowns());
-  for (Index j = 0; j < motion_.unknowns(); ++j) {
-    const MotionBasis::Column& column = motion_.columns()[static_cast<std::size_t>(j)];
-    if (column.first < samples.first) continue;
-    for (Index i = 0; i < column.value.size(); ++i) {
-      const Index since = samples.last - column.first - i;
-      if (since <= 0) break;
-      columns.col(j) += column.value[i] * lin.spline.col(since);
-    }
-    const Index since_tail = samples.last - column.first - column.value.size();
-    if (column.tail != 0 && since_tail > 0) columns.col(j) += column.tail * lin.spline_summed.col(since_tail);
-  }
-  return columns;
+/// d state / d a motion unknown, by its spline alone, at a sample.
+VectorXd RunResidual::motion_state(const Linearised& lin, Index spline, Index at) const {
+  const MotionBasis::Column& column = motion_.columns()[static_cast<std::size_t>(spline)];
+  VectorXd state = VectorXd::Zero(lin.spline.rows());
+  for (Index i = 0; i < column.value.size() && column.first + i < at; ++i) state += column.value[i] * lin.spline.col(at - column.first - i);
+  const Index since_tail = at - column.first - column.value.size();
+  if (column.tail != 0 && since_tail > 0) state += column.tail * lin.spline_summed.col(since_tail);
+  return state;
 }
 
-/// d state / d c behind a phase, from that at its start.
-MatrixXd RunResidual::state_behind(const Linearised& lin, const MotionBasis::Phase& phase, const Interval& samples, const MatrixXd& start) const {
-  MatrixXd behind = product(power(lin.step.transition.value, samples.length()), start);
-  if (phase.moving && motion_.unknowns() > 0) behind.leftCols(motion_.unknowns()) += motion_state_columns(lin, samples);
-  if (phase.moving && samples.last < run_->samples()) {
-    RowVectorXd angle = RowVectorXd::Zero(start.cols());
-    angle.head(motion_.unknowns()) = motion_.angle_columns({samples.last, samples.last + 1});
-    angle.tail(start.cols() - unknowns_).setConstant(arrival_angle(lin.system));
-    stand_still(behind, lin.system.motion, angle);
-  }
+/// d state / d c behind a piece, from that at its start: by the splines that stand still there, or, where the record ends, by all.
+MatrixXd RunResidual::state_behind(const Linearised& lin, const Piece& piece, const Interval& samples, const MatrixXd& leap, const MatrixXd& start) const {
+  MatrixXd behind = product(leap, start);
+  if (!piece.moving) return behind;
+  const bool ends = samples.last == run_->samples();
+  const Index last = ends ? piece.splines.end : std::min(first_open(samples.last), piece.splines.end);
+  for (Index j = piece.splines.still; j < last; ++j) behind.col(j) += motion_state(lin, j, samples.last);
+  if (ends || motion_.unknowns() == 0) return behind;
+  RowVectorXd angle = RowVectorXd::Zero(start.cols());
+  angle.head(last) = level_before(last);
+  angle.tail(start.cols() - unknowns_).setConstant(arrival_angle(lin.system));
+  stand_still(behind, lin.system.motion, angle);
   return behind;
+}
+
+/// The state [x | level of the angle | splines that act still] behind a piece over [its own splines | that at its start], x without the splines that act still.
+MatrixXd RunResidual::transition(const Linearised& lin, const Piece& piece, bool has_state, const Splines& next, const MatrixXd& leap) const {
+  const Splines& here = piece.splines;
+  const Index n = lin.system.states(), own = here.own();
+  const auto place = [&](Index spline) { return spline >= here.begin ? spline - here.begin : own + n + 1 + spline - here.still; };
+  MatrixXd moves = MatrixXd::Zero(n + 1 + next.open(), own + (has_state ? n + 1 + here.open() : 0));
+  if (has_state) {
+    moves.block(0, own, n, n) = leap;
+    moves(n, own + n) = 1;
+  }
+  for (Index j = here.still; j < next.still; ++j) {
+    moves.col(place(j)).head(n) = motion_state(lin, j, piece.samples.last);
+    moves(n, place(j)) = motion_.columns()[static_cast<std::size_t>(j)].tail;
+  }
+  for (Index j = next.still; j < next.begin; ++j) moves(n + 1 + j - next.still, place(j)) = 1;
+  if (!piece.moving) return moves;
+  moves.row(lin.system.motion) = moves.row(n);
+  moves.middleRows(lin.system.motion + 1, 2).setZero();
+  return moves;
+}
+
+/// Rows over [own splines | state | offsets, angle before the motion] of a link, from those over the splines that act (or none), the model's states (or none), and some of the last ones.
+MatrixXd RunResidual::link_rows(const Piece& piece, bool has_state, const MatrixXd& acting, const MatrixXd& states, const MatrixXd& shared, Index first_shared) const {
+  const Splines& splines = piece.splines;
+  const Index own = splines.own(), open = splines.open(), ends = unknowns_ - first_offset_, n = states_ + filter_states(), level = motion_.unknowns() > 0 ? 1 : 0;
+  MatrixXd rows = MatrixXd::Zero(shared.rows(), own + (has_state ? n + level + open : 0) + ends);
+  if (acting.size() > 0) {
+    rows.leftCols(own) = acting.middleCols(open, own);
+    if (has_state) rows.middleCols(own + n + 1, open) = acting.leftCols(open);
+    if (has_state && acting.cols() > open + own) rows.col(own + n) = acting.col(open + own);  // level
+  }
+  if (states.size() > 0) rows.middleCols(own, n) = states;
+  rows.middleCols(rows.cols() - ends + first_shared - first_offset_, shared.cols()) = shared;
+  return rows;
+}
+
+/// A link's rows over all of c.
+MatrixXd RunResidual::over_c(const Piece& piece, bool has_state, const MatrixXd& rows, const MatrixXd& start) const {
+  const Splines& splines = piece.splines;
+  const Index own = splines.own(), open = splines.open(), ends = unknowns_ - first_offset_, n = start.rows();
+  MatrixXd all = MatrixXd::Zero(rows.rows(), unknowns_);
+  if (has_state) {
+    all = product(rows.middleCols(own, n), start.leftCols(unknowns_));
+    if (motion_.unknowns() > 0) {
+      all.leftCols(splines.still) += rows.col(own + n) * level_before(splines.still);
+      all.middleCols(splines.still, open) += rows.middleCols(own + n + 1, open);
+    }
+  }
+  all.middleCols(splines.begin, own) += rows.leftCols(own);
+  all.rightCols(ends) += rows.rightCols(ends);
+  return all;
+}
+
+/// Pieces up to the last that says anything.
+std::size_t RunResidual::counted_pieces() const {
+  std::size_t count = pieces_.size();
+  while (count > 0 && counted(pieces_[count - 1].samples).length() <= 0 && (angle_rows_.empty() || angle_rows_[count - 1].isZero(0))) --count;
+  return count;
 }
 
 /// The sample of a rest from which on nothing that c can do is more than a polynomial over whole stretches. Slopes in theta, t exp(-at) where c does
@@ -143,8 +204,8 @@ Index RunResidual::smooth_from(const Linearised& lin, const Interval& samples, c
   return samples.last;
 }
 
-/// The stretches of a block at rest: their rotations, and what c does to the rows that are kept.
-MatrixXd RunResidual::reach_at_rest(const Linearised& lin, run_rows::Block& block) const {
+/// The stretches of a block at rest: their rotations, and the rows that are kept.
+MatrixXd RunResidual::rows_at_rest(const Linearised& lin, const Piece& piece, bool has_state, run_rows::Block& block) const {
   const rest_rows::FreeRows& free = lin.free[static_cast<std::size_t>(block.channel)];
   const Index n = lin.system.states();
   std::vector<MatrixXd> spans;
@@ -175,27 +236,21 @@ MatrixXd RunResidual::reach_at_rest(const Linearised& lin, run_rows::Block& bloc
     spans.push_back(std::move(span));
     since = product(since, lin.leap);
   }
-  return block.join(spans, lin.offsets_from(*this, block.channel), lin.wandering ? measured_.cols() : 1);
+  const MatrixXd span = block.join(spans);
+  return link_rows(piece, has_state, {}, has_state ? MatrixXd(span.leftCols(n)) : MatrixXd(), span.rightCols(span.cols() - n), lin.offsets_from(*this, block.channel));
 }
 
-/// What c does to the weighted readings of a block in which the shaft moves: by the splines that begin in it, by the state at its start, and by the offset.
-MatrixXd RunResidual::reach_in_motion(const Linearised& lin, run_rows::Block& block) const {
+/// The weighted rows of a block in which the shaft moves: over the splines that act in it, the state at its start, and the offsets.
+MatrixXd RunResidual::rows_in_motion(const Linearised& lin, const Piece& piece, bool has_state, run_rows::Block& block) const {
   const Interval& s = block.samples;
   const auto w = weight_.col(block.channel).segment(s.first, s.length());
-  const MatrixXd& free = lin.free[static_cast<std::size_t>(block.channel)].rows;
-  const bool from_rest = block.start.isZero(0);
-  const auto [first, count] = splines_in(s);
-  const Index n = from_rest ? 0 : lin.system.states();
+  const Index acting = piece.splines.all(), n = has_state ? lin.system.states() : 0;
   const MatrixXd offsets = lin.offset_columns(block.channel, s);
-  MatrixXd span(s.length(), count + n + offsets.cols());
-  span << motion_output_columns(lin, block.channel, s).middleCols(first, count), free.topLeftCorner(s.length(), n), offsets;
+  MatrixXd span(s.length(), acting + n + offsets.cols());
+  span << motion_output_columns(lin, block.channel, s, piece.splines), lin.free[static_cast<std::size_t>(block.channel)].rows.topLeftCorner(s.length(), n), offsets;
   span = w.asDiagonal() * span;
   if (span.rows() > 2 * span.cols()) span = block.add_stretch(std::move(span));
-  MatrixXd reach = MatrixXd::Zero(span.rows(), block.start.cols());
-  reach.middleCols(first, count) = span.leftCols(count);
-  if (n > 0) reach += span.middleCols(count, n) * block.start;
-  reach.middleCols(lin.offsets_from(*this, block.channel), offsets.cols()) += span.rightCols(offsets.cols());
-  return reach;
+  return link_rows(piece, has_state, span.leftCols(acting), span.middleCols(acting, n), span.rightCols(offsets.cols()), lin.offsets_from(*this, block.channel));
 }
 
 /// Weighted readings of a block on their way through its rotations, without what the inputs do.
@@ -228,41 +283,71 @@ const rest_rows::SmoothReadings& RunResidual::smooth_readings(Index channel, con
       .first->second;
 }
 
-/// All rows [c | y], those of phases at rest rotated and cut to what c can reach; solves for c. What the state that the run arrived in does lies in the span of the free response: it is taken
-/// from the readings behind the rotations.
+/// The rows of all pieces, those at rest rotated and cut to what c can reach; solves for c. What the state that the run arrived in does lies in the span of the free response: it is taken
+/// from the readings behind the rotations. A prior on the motion holds many knots together: with it the rows are over all of c at once.
 void RunResidual::stack_rows(Linearised& lin) const {
+  MatrixXd start = MatrixXd::Zero(lin.system.states(), unknowns_ + arrival_.cols());
+  for (std::size_t i = 0; i < free_.size(); ++i) start(free_[i], first_state_ + static_cast<Index>(i)) = 1;
   if (lin.noise) {
-    MatrixXd from = MatrixXd::Zero(lin.system.states(), unknowns_);
-    for (std::size_t i = 0; i < free_.size(); ++i) from(free_[i], first_state_ + static_cast<Index>(i)) = 1;
+    const MatrixXd from = start.leftCols(unknowns_);
     lin.settle_white(*this, from, free_response_rows(lin.system, lin.step, last_sample_), measured_.topRows(last_sample_) - lin.known.topRows(last_sample_));
     lin.end = power(lin.step.transition.value, last_sample_) * from;
     return;
   }
-  std::vector<MatrixXd> rows;
-  double unreachable = 0;
-  MatrixXd start = MatrixXd::Zero(lin.system.states(), unknowns_ + arrival_.cols());
   if (arrival_.cols() > 0) start.rightCols(1) = arrival_.value;
-  for (std::size_t i = 0; i < free_.size(); ++i) start(free_[i], first_state_ + static_cast<Index>(i)) = 1;
-  for (const MotionBasis::Phase& phase : phases_) {
-    const Interval s = counted(phase);
-    if (s.length() <= 0) break;
-    const Index smooth = phase.moving ? s.last : smooth_from(lin, s, start);
-    for (Index c = 0; c < measured_.cols(); ++c) {
-      run_rows::Block block{s, phase.moving, c, start, {}, smooth};
-      const MatrixXd reach = phase.moving ? reach_in_motion(lin, block) : reach_at_rest(lin, block);
-      run_rows::Rotated rotated = rotated_readings(lin, block, unreachable);
-      MatrixXd together(reach.rows(), unknowns_ + 1);
-      together << reach.leftCols(unknowns_), block.reached(rotated);
-      if (arrival_.cols() > 0) together.col(unknowns_) -= reach.col(unknowns_);
-      for (const MatrixXd& others : rotated.others) unreachable += others.squaredNorm();
-      rows.push_back(std::move(together));
-      lin.blocks.push_back(std::move(block));
+  lin.linked = motion_prior_.rows() == 0;
+  const std::size_t count = counted_pieces();
+  const Index last = unknowns_ - first_state_;
+  std::vector<run_rows::Link> links(count);
+  std::vector<MatrixXd> right(count), rows;  // rows: [c | y]
+  double unreachable = 0;
+  MatrixXd begin(0, last), leap;
+  Index leaps = -1;  // so many samples
+  for (std::size_t p = 0; p < count; ++p) {
+    const Piece& piece = pieces_[p];
+    const Interval s = counted(piece.samples);
+    const bool moved = has_state(piece, start);
+    if (p == 0 && moved) {
+      begin = MatrixXd::Zero(lin.system.states() + (motion_.unknowns() > 0 ? 1 : 0), last);
+      begin.topRows(lin.system.states()) = start.middleCols(first_state_, last);
     }
-    start = state_behind(lin, phase, s, start);
+    std::vector<MatrixXd> of_link, of_right;
+    const Index smooth = piece.moving || s.length() <= 0 ? s.last : smooth_from(lin, s, start);
+    for (Index c = 0; c < measured_.cols() && s.length() > 0; ++c) {
+      run_rows::Block block{s, piece.moving, c, start, {}, smooth};
+      of_link.push_back(piece.moving ? rows_in_motion(lin, piece, moved, block) : rows_at_rest(lin, piece, moved, block));
+      run_rows::Rotated rotated = rotated_readings(lin, block, unreachable);
+      of_right.push_back(block.reached(rotated));
+      if (arrival_.cols() > 0 && moved) of_right.back() -= of_link.back().middleCols(piece.splines.own(), start.rows()) * start.rightCols(1);
+      for (const MatrixXd& others : rotated.others) unreachable += others.squaredNorm();
+      lin.blocks.push_back(std::move(block));
+      if (lin.linked) continue;
+      rows.emplace_back(of_link.back().rows(), unknowns_ + 1);
+      rows.back() << over_c(piece, moved, of_link.back(), start), of_right.back();
+    }
+    if (lin.linked) {
+      if (!angle_rows_.empty()) {
+        const MatrixXd& angle = angle_rows_[p];
+        of_link.push_back(link_rows(piece, moved, angle.leftCols(piece.splines.all() + 1), {}, angle.middleCols(piece.splines.all() + 1, 1), angle_offset_));
+        of_right.push_back(angle.rightCols(1));
+      }
+      links[p] = {piece.splines.begin, piece.splines.own(), of_link.empty() ? MatrixXd() : stacked(of_link, of_link.front().cols()), {}};
+      right[p] = stacked(of_right, 1);
+    }
+    if (s.length() > 0 && s.length() != leaps) leap = power(lin.step.transition.value, leaps = s.length());
+    if (lin.linked && p + 1 < count && (moved || piece.splines.end > 0)) links[p].transition = transition(lin, piece, moved, pieces_[p + 1].splines, leap);
+    if (s.length() > 0) start = state_behind(lin, piece, s, leap, start);
   }
   lin.end = start;
-  rows.insert(rows.end(), angle_rows_.begin(), angle_rows_.end());
-  lin.settle(rows, unknowns_, unreachable);
+  if (!lin.linked) {
+    rows.push_back(angle_rows());
+    lin.settle(rows, unknowns_, unreachable);
+    return;
+  }
+  const MatrixXd held = held_rows();
+  auto chain = std::make_unique<run_rows::ChainEliminator>(std::move(links), unknowns_, std::move(begin), unknowns_ - first_offset_, held.middleCols(first_state_, last));
+  const run_rows::ChainEliminator::Rotated found = chain->rotated(std::move(right), held.rightCols(1));
+  lin.settle(std::move(chain), found, unreachable);
 }
 
 RunResidual::Solution RunResidual::solve(const VectorXd& theta) const {
@@ -365,18 +450,18 @@ DualMatrix RunResidual::follow_partials(const VectorXd& theta, const VectorXd& l
   if (arrival_.parameters() > 0) state.partial = arrival_.partial;
   const Motion motion = motion_.unknowns() > 0 ? motion_of(motion_.coefficients(linear.head(motion_.unknowns())), run_->dt) : Motion{};
   std::size_t block = 0;
-  for (const MotionBasis::Phase& phase : phases_) {
-    const Interval s = counted(phase);
+  for (const Piece& piece : pieces_) {
+    const Interval s = counted(piece.samples);
     if (s.length() <= 0) break;
-    const Index length = phase.moving ? s.length() : rest_rows::stretch_samples;
+    const Index length = piece.moving ? s.length() : rest_rows::stretch_samples;
     for (Index first = s.first; first < s.last; first += length) {
       const Interval stretch{first, std::min(first + length, s.last)};
       const bool is_smooth = !blocks.empty() && blocks[block].is_smooth(stretch);
       const Response response = is_smooth        ? smooth->from(state)
-                                : phase.moving ? drive(system, step, state, stretch.length(), motion.jerk.segment(first, stretch.length()), {}, Partials::all)
+                                : piece.moving ? drive(system, step, state, stretch.length(), motion.jerk.segment(first, stretch.length()), {}, Partials::all)
                                                  : free.from(state, stretch.length());
       state = response.end;
-      if (phase.moving && stretch.last < run_->samples()) stand_still(state.value, system.motion, RowVectorXd::Constant(1, motion.angle[stretch.last] + arrival_angle(system)));
+      if (piece.stands_still && stretch.last < run_->samples()) stand_still(state.value, system.motion, RowVectorXd::Constant(1, motion.angle[stretch.last] + arrival_angle(system)));
       for (Index c = 0; c < channels; ++c) {
         MatrixXd m = slopes_and_prediction(response, known, stretch, c, parameters);
         if (wandering) add_readings(*wandering, linear.segment(first_offset_, channels), c, stretch, m);
@@ -399,11 +484,37 @@ RunResidual::Evaluation says_nothing(Index parameters, Index unknowns) {
   e.jacobian = MatrixXd::Zero(parameters + 1, parameters);
   e.linear = VectorXd::Zero(unknowns);
   e.linear_slope = MatrixXd::Zero(unknowns, parameters);
-  e.linear_factor = MatrixXd::Zero(unknowns, unknowns);
   return e;
 }
 
+/// Rows [slopes | left] that hold what c leaves of the angle, which no theta moves.
+MatrixXd of_angle(const VectorXd& left, Index columns) {
+  MatrixXd rows = MatrixXd::Zero(left.size(), columns);
+  rows.rightCols(1) = left;
+  return rows;
+}
+
 }  // namespace
+
+/// What the channels' blocks reach and what c leaves of the angle, on their way through the links.
+run_rows::ChainEliminator::Rotated RunResidual::Linearised::rotated_links(const RunResidual& run, const std::vector<MatrixXd>& reached, Index columns) const {
+  const std::size_t count = run.counted_pieces(), channels = static_cast<std::size_t>(run.measured_.cols());
+  std::vector<MatrixXd> right(count);
+  for (std::size_t p = 0, b = 0; p < count; ++p) {
+    std::vector<MatrixXd> of_link;
+    for (std::size_t c = 0; c < channels && b < reached.size(); ++c) of_link.push_back(reached[b++]);
+    if (!run.angle_rows_.empty()) of_link.push_back(of_angle(run.angle_residual(p, linear), columns));
+    right[p] = stacked(of_link, columns);
+  }
+  return eliminate->rotated(std::move(right), of_angle(run.held_residual(linear), columns));
+}
+
+/// The same where the rows are over all of c.
+run_rows::ChainEliminator::Rotated RunResidual::Linearised::rotated_whole(const RunResidual& run, std::vector<MatrixXd> reached, Index columns) const {
+  const MatrixXd angle = run.angle_rows();
+  reached.push_back(of_angle(angle.col(run.unknowns_) - angle.leftCols(run.unknowns_) * linear, columns));
+  return eliminate->rotated({}, stacked(reached, columns));
+}
 
 RunResidual::Evaluation RunResidual::differentiate(const Solution& solution) const {
   const bool is_last = solution.model == last_solution_.model;
@@ -442,20 +553,13 @@ RunResidual::Evaluation RunResidual::differentiate(const Solution& solution) con
     reached.push_back(lin.blocks[b].reached(rotated_blocks[b]));
     others.insert(others.end(), rotated_blocks[b].others.begin(), rotated_blocks[b].others.end());
   }
-  for (const MatrixXd& rows : angle_rows_) {
-    MatrixXd m = MatrixXd::Zero(rows.rows(), parameters + 1);
-    m.col(parameters) = rows.col(unknowns_) - rows.leftCols(unknowns_) * solution.linear;
-    reached.push_back(std::move(m));
-  }
-  const MatrixXd rotated = lin.eliminate->rotated(stacked(reached, parameters + 1));
-  const Index rank = lin.eliminate->rank();
-  others.push_back(rotated.bottomRows(rotated.rows() - rank));
+  const run_rows::ChainEliminator::Rotated rotated = lin.linked ? lin.rotated_links(*this, reached, parameters + 1) : lin.rotated_whole(*this, std::move(reached), parameters + 1);
+  others.insert(others.end(), rotated.beside.begin(), rotated.beside.end());
   const MatrixXd triangle = compress(stacked(others, parameters + 1));
 
   Evaluation e;
   e.linear = solution.linear;
-  e.linear_factor = lin.eliminate->factor();
-  e.linear_slope = lin.eliminate->solve(rotated.leftCols(parameters));
+  e.linear_slope = lin.eliminate->solve(rotated).leftCols(parameters);
   e.residual = VectorXd::Zero(parameters + 1);
   e.jacobian = MatrixXd::Zero(parameters + 1, parameters);
   e.jacobian.topRows(triangle.rows()) = triangle.leftCols(parameters);

@@ -118,7 +118,7 @@ ImaginedRun imagined(const FittedExplanation& truth, const CandidateRun& candida
   run.noisy = run.exact;
   for (std::size_t c = 0; c < like.channels().size(); ++c) add_noise(run.noisy, like.channels()[c], like.noise(c) * like.tempered(), random);
   if (candidate.run.kind == RunKind::step) add_noise(run.noisy, "alpha", angle_noise(truth, candidate), random);
-  run.windows = candidate.repeat ? like.motion().windows() : motion_windows(run.noisy);
+  run.windows = candidate.repeat ? like.motion().windows() : windows_to_fit(run.noisy);
   return run;
 }
 

@@ -238,7 +238,7 @@ void solve(Arrival& arrival, const JointProblem::SolveOptions& options) {
 
 Arrival arrive(const FitProblem& problem, const std::shared_ptr<const AeroelasticModel>& model, const ArrivalEffort& effort) {
   Windows windows;
-  for (const Run& run : problem.runs) windows.push_back(motion_windows(run));
+  for (const Run& run : problem.runs) windows.push_back(windows_to_fit(run));
   const Arrival start = first_guess(problem, model, windows, problem.start);
   Arrival arrival = problem.rig.is_modal() ? arrive_at_modes(start, problem, effort) : grow(start, problem, effort);
   hold_undetermined(arrival.joint);

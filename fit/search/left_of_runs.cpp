@@ -1,7 +1,6 @@
 #include "fit/search/left_of_runs.h"
 
 #include <Eigen/LU>
-#include <Eigen/QR>
 #include <Eigen/SVD>
 #include <algorithm>
 #include <cmath>
@@ -9,6 +8,7 @@
 #include "core/numerics/in_parallel.h"
 #include "core/numerics/prior_cost.h"
 #include "core/numerics/spectrum.h"
+#include "fit/likelihood/eliminator.h"
 #include "fit/likelihood/standardised_residual.h"
 
 namespace unrig {
@@ -25,26 +25,27 @@ double independent_share(const VectorXd& left) {
   return mean > 0 ? std::min(1.0, 2 * mean * mean / power.cwiseAbs2().mean()) : 1;  // the lines of white noise are exponentially distributed
 }
 
-/// What the readings say of some of the linear unknowns c, whatever the others are: residual = triangle (c - estimate).
+/// What the readings say of some of the unknowns behind the motion, whatever the others are: residual = triangle (c - estimate).
 struct Known {
   MatrixXd triangle;
   VectorXd estimate;
 };
-Known known_of(const RunResidual::Prediction& p, const std::vector<Index>& some) {
+
+/// `estimates` of them all, and R of what is known of them.
+Known known_of(const VectorXd& estimates, const MatrixXd& factor, const std::vector<Index>& some) {
   std::vector<Index> order;
-  for (Index i = 0; i < p.linear.size(); ++i)
+  for (Index i = 0; i < estimates.size(); ++i)
     if (std::find(some.begin(), some.end(), i) == some.end()) order.push_back(i);
   order.insert(order.end(), some.begin(), some.end());
   const auto count = static_cast<Index>(some.size());
-  const MatrixXd triangle = Eigen::HouseholderQR<MatrixXd>(p.linear_factor(Eigen::all, order)).matrixQR().triangularView<Eigen::Upper>();
-  return {triangle.block(p.linear.size() - count, p.linear.size() - count, count, count), p.linear(some)};
+  return {run_rows::compress(factor(Eigen::all, order)).bottomRightCorner(count, count), estimates(some)};
 }
 
-/// Places in c of those of these states that are unknown where the run begins.
+/// Places, behind the motion's unknowns, of those of these states that are unknown where the run begins.
 std::vector<Index> places_of(const RunResidual& run, const std::vector<Index>& states) {
   std::vector<Index> places;
   for (std::size_t i = 0; i < run.free_states().size(); ++i)
-    if (std::find(states.begin(), states.end(), run.free_states()[i]) != states.end()) places.push_back(run.motion().unknowns() + static_cast<Index>(i));
+    if (std::find(states.begin(), states.end(), run.free_states()[i]) != states.end()) places.push_back(static_cast<Index>(i));
   return places;
 }
 
@@ -74,9 +75,11 @@ MatrixXd likely_starts(const LinearSystem& system, const VectorXd& reading, doub
 void count_unknowns(const RunResidual& run, const VectorXd& theta, const RunResidual::Prediction& p, double log_samples, LeftOfRun& left) {
   left.unknowns = static_cast<double>(run.linear_unknowns());
   const LinearSystem system = run.model().system(run.conditions(), theta, run.channels());
+  const MatrixXd& factor = p.factor_behind_motion;
+  const VectorXd estimates = p.linear.tail(factor.cols());
   if (const std::vector<Index> filters = places_of(run, system.filters); !filters.empty()) {
     const MatrixXd likely = likely_starts(system, p.output.col(0), run.run().dt);
-    const Known known = known_of(p, filters);
+    const Known known = known_of(estimates, factor, filters);
     if (likely.allFinite()) left.unknowns -= static_cast<double>(filters.size()) - prior_cost(known.triangle, known.estimate, likely) / log_samples;  // else the reading does not move
   }
   std::vector<Index> others = system.settling;
@@ -85,12 +88,12 @@ void count_unknowns(const RunResidual& run, const VectorXd& theta, const RunResi
     const VectorXd reading = p.output.col(0).array() - p.output.col(0).mean();
     const auto count = static_cast<Index>(settling.size());
     const double swing = reading.norm() / std::sqrt(static_cast<double>(reading.size()));
-    const VectorXd told = Eigen::JacobiSVD<MatrixXd>(swing * known_of(p, settling).triangle).singularValues();
+    const VectorXd told = Eigen::JacobiSVD<MatrixXd>(swing * known_of(estimates, factor, settling).triangle).singularValues();
     left.unknowns -= static_cast<double>(count - (told.array() > 1).count());
   }
   for (const std::vector<Index>& part : system.parts) {  // each by itself: at frequencies apart they are all but orthogonal
     const std::vector<Index> places = places_of(run, part);
-    const Known known = known_of(p, places);
+    const Known known = known_of(estimates, factor, places);
     const double takes = (run.tempered() * (known.triangle * known.estimate)).squaredNorm(), costs = static_cast<double>(places.size()) * log_samples;
     if (takes > costs) continue;
     left.unknowns -= static_cast<double>(places.size());

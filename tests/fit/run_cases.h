@@ -141,6 +141,22 @@ inline Case step(Index stride) {
   return c;
 }
 
+/// A shaft that hardly rests: a motion of many knots.
+inline Case restless(Index stride) {
+  Case c{"restless, stride " + std::to_string(stride), beam_model(), empty_run(RunKind::step, 0.6, dt), {{{20, 212}, stride}}, {}};
+  const MotionBasis basis(samples, dt, c.windows);
+  VectorXd u(basis.unknowns());
+  for (Index j = 0; j < u.size(); ++j) {
+    const double knot = static_cast<double>(j * stride), begins = std::min(1.0, knot / 40);
+    u[j] = 0.02 * begins * begins * (3 - 2 * begins) * (std::sin(0.11 * knot) + 0.5 * std::sin(0.17 * knot + 1));
+  }
+  const VectorXd motion = basis.coefficients(u);
+  add_channel(c.run, "alpha", (motion_of(motion, dt).angle + white_noise(samples, 1.7e-4, 7)).array() + 0.04, "rad");
+  simulate(c, c.model->start_values(), {"gauge"}, motion);
+  c.theta = off(c.model->start_values());
+  return c;
+}
+
 inline Case forced() {
   Case c{"forced", modal_model(), empty_run(RunKind::forced, 0, dt), {}, {}};
   add_channel(c.run, "force", white_noise(samples, 1, 8));
@@ -181,11 +197,14 @@ inline std::vector<Case> every_case() {
   cases.push_back(pluck({"gauge", "tip", "twist"}));
   cases.push_back(step(1));
   cases.push_back(step(2));
+  cases.push_back(restless(1));
+  cases.push_back(restless(2));
   cases.push_back(forced());
   cases.push_back(moved(false));
   cases.push_back(moved(true));
   cases.push_back(damaged(pluck({"gauge", "twist"})));
   cases.push_back(damaged(step(1)));
+  cases.push_back(damaged(restless(1)));
   return cases;
 }
 
