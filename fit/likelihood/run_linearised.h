@@ -111,6 +111,29 @@ struct RunResidual::Linearised {
   Eigen::MatrixXd end;                  // as their starts, behind the last sample
   bool linked = false;                  // whether each piece is a link of the elimination; else all rows are over c as a whole
 
+  /// Rows of all pieces on their way into the elimination: as its links or, where a prior on the motion holds many knots together, over all of c at once.
+  struct Rows {
+    Rows(const RunResidual& run, bool linked);
+    /// The state that a run begins in, from d state / d c there, which is not zero.
+    void begin(const Eigen::MatrixXd& start);
+    /// A channel's rows of the next piece, and what they are to be. `start`: d state / d c where the piece begins.
+    void add(bool has_state, const Eigen::MatrixXd& of_link, const Eigen::MatrixXd& right, const Eigen::MatrixXd& start);
+    /// Those of the angle, and the way from this piece to the one behind it.
+    void end_piece(bool has_state, Eigen::MatrixXd transition);
+    bool is_last() const { return at_ + 1 == links_.size(); }
+    /// Solves for c, beside a sum of squares that c cannot reach.
+    void settle(Linearised& lin, double unreachable);
+
+   private:
+    const RunResidual& run_;
+    std::size_t at_ = 0;  // the piece
+    Eigen::MatrixXd begin_;
+    std::vector<run_rows::Link> links_;
+    std::vector<Eigen::MatrixXd> right_;
+    std::vector<Eigen::MatrixXd> own_, own_right_;  // of the piece
+    std::vector<Eigen::MatrixXd> whole_;            // [c | y]
+    bool linked_;
+  };
   /// Solves the stacked rows [c | y] for c, beside a sum of squares that c cannot reach.
   void settle(const std::vector<Eigen::MatrixXd>& rows, Eigen::Index unknowns, double unreachable);
   void settle(std::unique_ptr<run_rows::ChainEliminator> chain, const run_rows::ChainEliminator::Rotated& right, double unreachable);

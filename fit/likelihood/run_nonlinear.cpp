@@ -14,8 +14,6 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-using run_rows::stacked;
-
 namespace {
 
 /// Jerk and inputs of one phase.
@@ -85,36 +83,27 @@ VectorXd RunResidual::largest_arguments(const VectorXd& theta) const {
 /// The rows of the model linearised about `linear`, piece by piece; solves them for the next c. False where the model diverges. The state of a link is that of the model, of the filters of the
 /// noise behind it, with what the splines that act still have done so far.
 bool RunResidual::stack_nonlinear_rows(Linearised& lin, const VectorXd& theta, const VectorXd& linear) const {
-  const Index n = lin.system.states(), with_filters = n + filter_states(), last = unknowns_ - first_state_, level = motion_.unknowns() > 0 ? 1 : 0;
+  const Index n = lin.system.states(), with_filters = n + filter_states();
   const VectorXd jerk = whole_jerk(linear);
   NonlinearDrive from{initial_state(linear, n), {}, {}, {}, {}};
   FilterStates filters = filters_at(initial_state(linear, with_filters));
   MatrixXd start = MatrixXd::Zero(with_filters, unknowns_);  // d state / d c, those of the filters behind the model's
   for (std::size_t i = 0; i < free_.size(); ++i) start(free_[i], first_state_ + static_cast<Index>(i)) = 1;
-  const std::size_t count = counted_pieces();
-  std::vector<run_rows::Link> links(count);
-  std::vector<MatrixXd> right(count), rows;  // rows: [c | y], where a prior on the motion holds many knots together
-  double unreachable = 0;
   lin.blocks.clear();
-  lin.linked = !lin.noise && motion_prior_.rows() == 0;
-  MatrixXd begin(0, last);
-  VectorXd state;  // of the links, as `linear` has it
+  lin.linked = false;
+  Linearised::Rows rows(*this, motion_prior_.rows() == 0);
+  if (!start.isZero(0)) rows.begin(start);
+  double unreachable = 0;
+  const std::size_t count = counted_pieces();
   for (std::size_t p = 0; p < count; ++p) {
     const Piece& piece = pieces_[p];
     const Splines& splines = piece.splines;
     const Interval s = counted(piece.samples);
     const bool moved = has_state(piece, start);
-    if (p == 0 && moved) {
-      begin = MatrixXd::Zero(with_filters + level, last);
-      begin.topRows(with_filters) = start.middleCols(first_state_, last);
-      state = begin * linear.tail(last);
-    }
     const Index states = moved || !piece.moving ? with_filters : 0, acting = piece.moving && s.length() > 0 ? splines_in(s).all() : 0;
     VectorXd at(states + acting);  // what tangents are taken in, as `linear` has it
-    at.head(states) = moved ? VectorXd(state.head(states)) : VectorXd::Zero(states);
-    at.tail(acting) = linear.segment(splines.still, acting);
-    MatrixXd end = MatrixXd::Zero(with_filters, at.size());
-    std::vector<MatrixXd> of_link, of_right;
+    at << (start * linear).head(states), linear.segment(splines.still, acting);
+    MatrixXd end = MatrixXd::Zero(with_filters, at.size());  // d state / d that, behind the piece
     if (s.length() > 0) {
       drive_over(s, piece.moving, jerk, inputs_, from);
       MatrixXd tangents = MatrixXd::Zero(with_filters, at.size());
@@ -142,64 +131,47 @@ bool RunResidual::stack_nonlinear_rows(Linearised& lin, const VectorXd& theta, c
         filter_outputs(channel, response.output.col(c), filters);
         const VectorXd y = readings().col(c).segment(s.first, s.length()) - response.output.col(c) + tangent * at;  // beside the offset, which stays linear
         run_rows::Block block{s, piece.moving, c, start, std::move(tangent), s.last};
+        MatrixXd of_splines = MatrixXd::Zero(piece.moving ? s.length() : 0, splines.all()), of_states, offset = w;
         if (piece.moving) {
-          const MatrixXd weighted = w.asDiagonal() * block.rows;
-          MatrixXd of_splines = MatrixXd::Zero(s.length(), splines.all());
-          of_splines.leftCols(acting) = weighted.rightCols(acting);
-          of_link.push_back(link_rows(piece, moved, of_splines, weighted.leftCols(states), w, first_offset_ + c));
+          of_states = w.asDiagonal() * block.rows.leftCols(states);
+          of_splines.leftCols(acting) = w.asDiagonal() * block.rows.rightCols(acting);
         } else {
           const MatrixXd span = block.rotate_rows(w);
-          of_link.push_back(link_rows(piece, moved, {}, moved ? MatrixXd(span.leftCols(states)) : MatrixXd(), span.rightCols(1), first_offset_ + c));
+          of_states = span.leftCols(states);
+          offset = span.rightCols(1);
         }
+        if (!moved) of_states.resize(0, 0);
         run_rows::Rotated rotated;
         block.rotate(s, w.cwiseProduct(y), rotated);
-        of_right.push_back(block.reached(rotated));
+        const MatrixXd right = block.reached(rotated);
         for (const MatrixXd& others : rotated.others) unreachable += others.squaredNorm();
+        rows.add(moved, link_rows(piece, moved, of_splines, of_states, offset, first_offset_ + c), right, start);
         lin.blocks.push_back(std::move(block));
-        if (lin.linked) continue;
-        rows.emplace_back(of_link.back().rows(), unknowns_ + 1);
-        rows.back() << over_c(piece, moved, of_link.back(), start), of_right.back();
       }
       end.topRows(n) = response.end_tangent;
       Index row = n;
       for (const MatrixXd& of_filter : filter_tangents) end.middleRows(row, of_filter.rows()) = of_filter, row += of_filter.rows();
       from.start = response.end;
     }
-    if (!angle_rows_.empty()) {
-      const MatrixXd& angle = angle_rows_[p];
-      of_link.push_back(link_rows(piece, moved, angle.leftCols(splines.all() + 1), {}, angle.middleCols(splines.all() + 1, 1), angle_offset_));
-      of_right.push_back(angle.rightCols(1));
-    }
-    links[p] = {splines.begin, splines.own(), stacked(of_link, of_link.front().cols()), {}};
-    right[p] = stacked(of_right, 1);
-    if (p + 1 == count) break;
-    const Splines& next = pieces_[p + 1].splines;
-    const Index own = splines.own(), open = splines.open();
-    if (moved || splines.end > 0) {
+    MatrixXd moves;
+    if (!rows.is_last() && (moved || splines.end > 0)) {
+      const Splines& next = pieces_[p + 1].splines;
+      const Index own = splines.own(), open = splines.open();
       const auto place = [&](Index spline) { return spline >= splines.begin ? spline - splines.begin : own + with_filters + 1 + spline - splines.still; };
-      MatrixXd moves = MatrixXd::Zero(with_filters + 1 + next.open(), own + (moved ? with_filters + 1 + open : 0));
-      if (moved) moves.block(0, own, with_filters, states) = end.leftCols(states), moves(with_filters, own + with_filters) = 1;
+      moves = MatrixXd::Zero(with_filters + 1 + next.open(), own + (moved ? with_filters + 1 + open : 0));
+      if (moved) {
+        moves.block(0, own, with_filters, with_filters) = end.leftCols(with_filters);
+        moves(with_filters, own + with_filters) = 1;
+      }
       for (Index j = 0; j < acting; ++j) moves.col(place(splines.still + j)).head(with_filters) = end.col(states + j);
       for (Index j = splines.still; j < next.still; ++j) moves(with_filters, place(j)) = motion_.columns()[static_cast<std::size_t>(j)].tail;
       for (Index j = next.still; j < next.begin; ++j) moves(with_filters + 1 + j - next.still, place(j)) = 1;
-      VectorXd before(own + state.size());
-      before << linear.segment(splines.begin, own), state;
-      state = moves * before;
-      links[p].transition = std::move(moves);
     }
-    MatrixXd behind = states > 0 ? product(end.leftCols(states), start) : MatrixXd::Zero(with_filters, unknowns_);
-    behind.middleCols(splines.still, acting) += end.rightCols(acting);
-    start = std::move(behind);
+    rows.end_piece(moved, std::move(moves));
+    start = states > 0 ? product(end.leftCols(states), start) : MatrixXd(MatrixXd::Zero(with_filters, unknowns_));
+    start.middleCols(splines.still, acting) += end.rightCols(acting);
   }
-  if (!lin.linked) {
-    rows.push_back(angle_rows());
-    lin.settle(rows, unknowns_, unreachable);
-    return true;
-  }
-  const MatrixXd held = held_rows();
-  auto chain = std::make_unique<run_rows::ChainEliminator>(std::move(links), unknowns_, std::move(begin), unknowns_ - first_offset_, held.middleCols(first_state_, last));
-  const run_rows::ChainEliminator::Rotated found = chain->rotated(std::move(right), held.rightCols(1));
-  lin.settle(std::move(chain), found, unreachable);
+  rows.settle(lin, unreachable);
   return true;
 }
 

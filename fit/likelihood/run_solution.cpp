@@ -283,8 +283,56 @@ const rest_rows::SmoothReadings& RunResidual::smooth_readings(Index channel, con
       .first->second;
 }
 
+RunResidual::Linearised::Rows::Rows(const RunResidual& run, bool linked)
+    : run_(run), begin_(0, run.unknowns_ - run.first_state_), links_(run.counted_pieces()), right_(links_.size()), linked_(linked) {}
+
+void RunResidual::Linearised::Rows::begin(const MatrixXd& start) {
+  begin_ = MatrixXd::Zero(start.rows() + (run_.motion_.unknowns() > 0 ? 1 : 0), begin_.cols());
+  begin_.topRows(start.rows()) = start.middleCols(run_.first_state_, begin_.cols());
+}
+
+void RunResidual::Linearised::Rows::add(bool has_state, const MatrixXd& of_link, const MatrixXd& right, const MatrixXd& start) {
+  if (linked_) {
+    own_.push_back(of_link);
+    own_right_.push_back(right);
+    return;
+  }
+  whole_.emplace_back(of_link.rows(), run_.unknowns_ + 1);
+  whole_.back() << run_.over_c(run_.pieces_[at_], has_state, of_link, start), right;
+}
+
+void RunResidual::Linearised::Rows::end_piece(bool has_state, MatrixXd transition) {
+  const Piece& piece = run_.pieces_[at_];
+  if (linked_) {
+    if (!run_.angle_rows_.empty()) {
+      const MatrixXd& angle = run_.angle_rows_[at_];
+      const Index acting = piece.splines.all();
+      own_.push_back(run_.link_rows(piece, has_state, angle.leftCols(acting + 1), {}, angle.middleCols(acting + 1, 1), run_.angle_offset_));
+      own_right_.push_back(angle.rightCols(1));
+    }
+    links_[at_] = {piece.splines.begin, piece.splines.own(), stacked(own_, own_.front().cols()), std::move(transition)};
+    right_[at_] = stacked(own_right_, 1);
+  }
+  own_.clear();
+  own_right_.clear();
+  ++at_;
+}
+
+void RunResidual::Linearised::Rows::settle(Linearised& lin, double unreachable) {
+  lin.linked = linked_;
+  if (!linked_) {
+    whole_.push_back(run_.angle_rows());
+    lin.settle(whole_, run_.unknowns_, unreachable);
+    return;
+  }
+  const MatrixXd held = run_.held_rows();
+  auto chain = std::make_unique<run_rows::ChainEliminator>(std::move(links_), run_.unknowns_, begin_, run_.unknowns_ - run_.first_offset_, held.middleCols(run_.first_state_, begin_.cols()));
+  const run_rows::ChainEliminator::Rotated right = chain->rotated(std::move(right_), held.rightCols(1));
+  lin.settle(std::move(chain), right, unreachable);
+}
+
 /// The rows of all pieces, those at rest rotated and cut to what c can reach; solves for c. What the state that the run arrived in does lies in the span of the free response: it is taken
-/// from the readings behind the rotations. A prior on the motion holds many knots together: with it the rows are over all of c at once.
+/// from the readings behind the rotations.
 void RunResidual::stack_rows(Linearised& lin) const {
   MatrixXd start = MatrixXd::Zero(lin.system.states(), unknowns_ + arrival_.cols());
   for (std::size_t i = 0; i < free_.size(); ++i) start(free_[i], first_state_ + static_cast<Index>(i)) = 1;
@@ -295,59 +343,34 @@ void RunResidual::stack_rows(Linearised& lin) const {
     return;
   }
   if (arrival_.cols() > 0) start.rightCols(1) = arrival_.value;
-  lin.linked = motion_prior_.rows() == 0;
-  const std::size_t count = counted_pieces();
-  const Index last = unknowns_ - first_state_;
-  std::vector<run_rows::Link> links(count);
-  std::vector<MatrixXd> right(count), rows;  // rows: [c | y]
+  Linearised::Rows rows(*this, motion_prior_.rows() == 0);
+  if (!start.isZero(0)) rows.begin(start);
   double unreachable = 0;
-  MatrixXd begin(0, last), leap;
+  MatrixXd leap;
   Index leaps = -1;  // so many samples
+  const std::size_t count = counted_pieces();
   for (std::size_t p = 0; p < count; ++p) {
     const Piece& piece = pieces_[p];
     const Interval s = counted(piece.samples);
     const bool moved = has_state(piece, start);
-    if (p == 0 && moved) {
-      begin = MatrixXd::Zero(lin.system.states() + (motion_.unknowns() > 0 ? 1 : 0), last);
-      begin.topRows(lin.system.states()) = start.middleCols(first_state_, last);
-    }
-    std::vector<MatrixXd> of_link, of_right;
     const Index smooth = piece.moving || s.length() <= 0 ? s.last : smooth_from(lin, s, start);
     for (Index c = 0; c < measured_.cols() && s.length() > 0; ++c) {
       run_rows::Block block{s, piece.moving, c, start, {}, smooth};
-      of_link.push_back(piece.moving ? rows_in_motion(lin, piece, moved, block) : rows_at_rest(lin, piece, moved, block));
+      const MatrixXd of_link = piece.moving ? rows_in_motion(lin, piece, moved, block) : rows_at_rest(lin, piece, moved, block);
       run_rows::Rotated rotated = rotated_readings(lin, block, unreachable);
-      of_right.push_back(block.reached(rotated));
-      if (arrival_.cols() > 0 && moved) of_right.back() -= of_link.back().middleCols(piece.splines.own(), start.rows()) * start.rightCols(1);
+      MatrixXd right = block.reached(rotated);
+      if (arrival_.cols() > 0 && moved) right -= of_link.middleCols(piece.splines.own(), start.rows()) * start.rightCols(1);
       for (const MatrixXd& others : rotated.others) unreachable += others.squaredNorm();
+      rows.add(moved, of_link, right, start);
       lin.blocks.push_back(std::move(block));
-      if (lin.linked) continue;
-      rows.emplace_back(of_link.back().rows(), unknowns_ + 1);
-      rows.back() << over_c(piece, moved, of_link.back(), start), of_right.back();
-    }
-    if (lin.linked) {
-      if (!angle_rows_.empty()) {
-        const MatrixXd& angle = angle_rows_[p];
-        of_link.push_back(link_rows(piece, moved, angle.leftCols(piece.splines.all() + 1), {}, angle.middleCols(piece.splines.all() + 1, 1), angle_offset_));
-        of_right.push_back(angle.rightCols(1));
-      }
-      links[p] = {piece.splines.begin, piece.splines.own(), of_link.empty() ? MatrixXd() : stacked(of_link, of_link.front().cols()), {}};
-      right[p] = stacked(of_right, 1);
     }
     if (s.length() > 0 && s.length() != leaps) leap = power(lin.step.transition.value, leaps = s.length());
-    if (lin.linked && p + 1 < count && (moved || piece.splines.end > 0)) links[p].transition = transition(lin, piece, moved, pieces_[p + 1].splines, leap);
+    const bool moves_next = !rows.is_last() && (moved || piece.splines.end > 0);
+    rows.end_piece(moved, moves_next ? transition(lin, piece, moved, pieces_[p + 1].splines, leap) : MatrixXd());
     if (s.length() > 0) start = state_behind(lin, piece, s, leap, start);
   }
   lin.end = start;
-  if (!lin.linked) {
-    rows.push_back(angle_rows());
-    lin.settle(rows, unknowns_, unreachable);
-    return;
-  }
-  const MatrixXd held = held_rows();
-  auto chain = std::make_unique<run_rows::ChainEliminator>(std::move(links), unknowns_, std::move(begin), unknowns_ - first_offset_, held.middleCols(first_state_, last));
-  const run_rows::ChainEliminator::Rotated found = chain->rotated(std::move(right), held.rightCols(1));
-  lin.settle(std::move(chain), found, unreachable);
+  rows.settle(lin, unreachable);
 }
 
 RunResidual::Solution RunResidual::solve(const VectorXd& theta) const {

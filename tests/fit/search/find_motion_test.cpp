@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <limits>
 #include <string>
 #include <vector>
 
@@ -23,7 +24,7 @@ JointProblem step_beside_friction() {
   decays.effects = {"coulomb-friction"};
   const FitResult known = fit(decays);
 
-  static const std::vector<unrig::Run> step{read_run(path("step_b.csv"))};  // the residual looks at it
+  static const std::vector<unrig::Run> step{read_run(path("step_a.csv"))};  // the residual looks at it
   static const AeroelasticModel model = model_of(decays.rig, step, decays.circulation, decays.effects);
   std::vector<RunResidual> one;
   one.emplace_back(model, step.front(), motion_windows(step.front()));
@@ -56,8 +57,8 @@ TEST(FindMotion, ASlopeThatWentAstrayIsFoundAgain) {
   joint.runs().front().solve(joint.theta(0));
   const auto freedom = static_cast<double>(joint.runs().front().degrees_of_freedom());
   JointProblem explained = joint;
-  fit_own_parameters(explained, 1e12);
-  EXPECT_EQ(explained.chi2(), joint.chi2()) << "it is not left with so much";
+  fit_own_parameters(explained, std::numeric_limits<double>::infinity());
+  EXPECT_EQ(explained.theta(0), joint.theta(0)) << "it is not left with so much";
   fit_own_parameters(joint, 10);
   EXPECT_LT(joint.chi2(), (1 + by_chance) * freedom);
 }
