@@ -18,7 +18,7 @@ using Matrix = Eigen::Ref<const MatrixXd>;
 /// The left factor is read anew for every four columns. Up to 181 rows and columns that is twice as fast as Eigen's blocks in narrow vectors; at 600, far beyond the cache, no longer.
 bool suits_tiles(const Matrix& a, const Matrix& b) {
   constexpr Index cached = 32768;  // numbers, 256 kB
-  return a.size() <= cached && b.cols() > 1;
+  return a.size() > 0 && a.size() <= cached && b.cols() > 1;  // Eigen knows what to do with nothing
 }
 
 void multiply(const Matrix& a, const Matrix& b, MatrixXd& c, bool add) {

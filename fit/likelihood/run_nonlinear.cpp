@@ -92,14 +92,15 @@ bool RunResidual::stack_nonlinear_rows(Linearised& lin, const VectorXd& theta, c
   lin.blocks.clear();
   lin.linked = false;
   Linearised::Rows rows(*this, motion_prior_.rows() == 0);
-  if (!start.isZero(0)) rows.begin(start);
+  bool moved = has_state(pieces_.front(), start);
+  if (moved) rows.begin(start);
   double unreachable = 0;
   const std::size_t count = counted_pieces();
   for (std::size_t p = 0; p < count; ++p) {
     const Piece& piece = pieces_[p];
     const Splines& splines = piece.splines;
     const Interval s = counted(piece.samples);
-    const bool moved = has_state(piece, start);
+    moved = moved || piece.splines.begin > 0;
     const Index states = moved || !piece.moving ? with_filters : 0, acting = piece.moving && s.length() > 0 ? splines_in(s).all() : 0;
     VectorXd at(states + acting);  // what tangents are taken in, as `linear` has it
     at << (start * linear).head(states), linear.segment(splines.still, acting);

@@ -344,7 +344,8 @@ void RunResidual::stack_rows(Linearised& lin) const {
   }
   if (arrival_.cols() > 0) start.rightCols(1) = arrival_.value;
   Linearised::Rows rows(*this, motion_prior_.rows() == 0);
-  if (!start.isZero(0)) rows.begin(start);
+  bool moved = has_state(pieces_.front(), start);
+  if (moved) rows.begin(start);
   double unreachable = 0;
   MatrixXd leap;
   Index leaps = -1;  // so many samples
@@ -352,7 +353,7 @@ void RunResidual::stack_rows(Linearised& lin) const {
   for (std::size_t p = 0; p < count; ++p) {
     const Piece& piece = pieces_[p];
     const Interval s = counted(piece.samples);
-    const bool moved = has_state(piece, start);
+    moved = moved || piece.splines.begin > 0;  // whatever an unstable model makes of nothing
     const Index smooth = piece.moving || s.length() <= 0 ? s.last : smooth_from(lin, s, start);
     for (Index c = 0; c < measured_.cols() && s.length() > 0; ++c) {
       run_rows::Block block{s, piece.moving, c, start, {}, smooth};

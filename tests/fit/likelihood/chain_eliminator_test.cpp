@@ -92,7 +92,8 @@ TEST(ChainEliminator, KnowsWhatTheRowsSay) {
     const MatrixXd information = p.columns.transpose() * p.columns, factor = chain.factor();
     EXPECT_TRUE(factor.isUpperTriangular(1e-300));
     EXPECT_TRUE((factor.transpose() * factor).isApprox(information, 1e-9));
-    const MatrixXd covariance = information.inverse(), last = covariance.bottomRightCorner(4, 4);
+    const MatrixXd root = MatrixXd(p.columns.householderQr().matrixQR().topRows(p.unknowns).triangularView<Eigen::Upper>()).inverse();
+    const MatrixXd covariance = root * root.transpose(), last = covariance.bottomRightCorner(4, 4);
     EXPECT_TRUE((chain.last_factor().transpose() * chain.last_factor()).isApprox(last.inverse(), 1e-8));
     for (Index j = p.unknowns - 4; j < p.unknowns; ++j) EXPECT_TRUE(chain.covariance_column(j).isApprox(covariance.col(j), 1e-8));
   }
@@ -130,6 +131,17 @@ TEST(ChainEliminator, LeavesAtZeroWhatNothingDetermines) {
   for (const MatrixXd& rows : rotated.beside) beside += rows.transpose() * rows;
   EXPECT_TRUE(beside.isApprox(least.transpose() * least, 1e-9));
   EXPECT_TRUE((chain.factor().transpose() * chain.factor()).isApprox(p.columns.transpose() * p.columns, 1e-9));
+}
+
+TEST(ChainEliminator, ALinkThatNothingIsKnownOfStaysAtZero) {
+  const Problem p = random_problem({4, 6, 5}, {12, 16, 30}, 0, [](std::size_t k, Link& link) {
+    if (k != 1) return;
+    for (MatrixXd* m : {&link.rows, &link.transition}) m->leftCols(6).setZero();
+  });
+  const MatrixXd found = p.chain().solve(p.chain().rotated(p.right, p.last_right));
+  EXPECT_TRUE(found.middleRows(4, 6).isZero(0));
+  const MatrixXd left = p.all_right - p.columns * found, least = p.all_right - p.columns * p.columns.colPivHouseholderQr().solve(p.all_right);
+  EXPECT_NEAR(left.norm() / least.norm(), 1, 1e-12);
 }
 
 TEST(ChainEliminator, WithoutLinksIsOneElimination) {
