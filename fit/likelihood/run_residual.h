@@ -39,11 +39,11 @@ struct RunOptions {
 /// ((y_measured - y(theta, c)) / sigma)^2 is least over c for every theta (variable projection, Golub and Pereyra 1973), so that a nonlinear solver
 /// sees only theta.
 ///
-/// With nonlinear effects at work the linear unknowns enter nonlinearly too, and c is searched for at every theta by Levenberg-Marquardt steps along exact
-/// tangents (core/propagate/nonlinear_response.h): n x n x (knots) a sample and step.
+/// c is eliminated piece by piece, in time that goes with the record (fit/likelihood/chain_eliminator.h): a piece is a rest, or the samples of some 32 knots. A prior on the motion
+/// (set_motion_prior) holds knots far apart together: all of c is eliminated at once then, and the cost goes with the cube of the knots.
 ///
-/// Without such effects c is eliminated piece by piece, in time that goes with the record (fit/likelihood/chain_eliminator.h): a piece is a rest, or the samples of some 32 knots. A prior on the motion
-/// (set_motion_prior) holds knots far apart together: all of c is eliminated at once then, as it is where effects are nonlinear, and the cost goes with the cube of the knots.
+/// With nonlinear effects at work the linear unknowns enter nonlinearly too, and c is searched for at every theta by Levenberg-Marquardt steps along exact
+/// tangents (core/propagate/nonlinear_response.h): n x n x (n + knots of a piece) a sample and step.
 ///
 /// Rests without jerk are compressed exactly: their rows span only the free response of the model, an n-dimensional space. Once its vibrations have died out
 /// (below 1e-11), a stretch of 1024 samples is looked at as the few numbers that a polynomial needs (fit/likelihood/rest_rows.h), so that a long rest costs next to nothing.
@@ -60,7 +60,7 @@ class RunResidual {
     Eigen::MatrixXd jacobian;  ///< (P + 1) x P, empty for Partials::none
     Eigen::VectorXd linear;    ///< c
     Eigen::MatrixXd linear_slope;   ///< d c / d theta, empty for Partials::none
-    Eigen::MatrixXd linear_factor = {};  ///< R with R^T R the information matrix of c at fixed theta, where it was asked for (RunResidual::linear_factor), else empty
+    Eigen::MatrixXd linear_factor = {};  ///< for who fills it in, as `correct` does: RunResidual::linear_factor
     DualMatrix departure;           ///< state behind the last sample, n x 1, of a linear model; with c following theta
   };
   Evaluation evaluate(const Eigen::VectorXd& theta, Partials partials) const;
