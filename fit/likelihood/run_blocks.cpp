@@ -1,6 +1,6 @@
 #include "fit/likelihood/run_linearised.h"
 
-// Rotations of the rows of one channel over one phase of the record.
+// Rotations of the rows of one channel over one piece of the record.
 
 namespace unrig::run_rows {
 
