@@ -57,6 +57,7 @@ Problem random_problem(const std::vector<Index>& own, const std::vector<Index>& 
     p.links.push_back(std::move(link));
     first += own[k];
   }
+  p.links.back().transition.resize(0, 0);
   MatrixXd of_last = MatrixXd::Zero(5, p.unknowns);
   of_last.rightCols(last) = p.last_rows;
   columns.push_back(of_last);
