@@ -29,20 +29,18 @@ set_property(DIRECTORY APPEND PROPERTY CMAKE_CONFIGURE_DEPENDS fuzz/sources.txt)
 file(STRINGS fuzz/sources.txt careful)
 list(APPEND careful core/run/run_text.cpp core/import/import.cpp)
 list(TRANSFORM careful PREPEND ${PROJECT_SOURCE_DIR}/)
-set_source_files_properties(${careful} PROPERTIES SKIP_UNITY_BUILD_INCLUSION ON COMPILE_OPTIONS "${careful_of_pointers}")
+set_source_files_properties(${careful} PROPERTIES SKIP_PRECOMPILE_HEADERS ON COMPILE_OPTIONS "${careful_of_pointers}")
 # As in the floors' own lists: source properties hold in one directory.
 set(kernels ${PROJECT_SOURCE_DIR}/core/numerics/product ${PROJECT_SOURCE_DIR}/core/numerics/small_product ${PROJECT_SOURCE_DIR}/core/numerics/householder ${PROJECT_SOURCE_DIR}/core/numerics/triangularise)
 list(TRANSFORM kernels APPEND .cpp OUTPUT_VARIABLE chosen)
 list(TRANSFORM kernels APPEND _avx2.cpp OUTPUT_VARIABLE wide)
 if(CMAKE_SYSTEM_PROCESSOR MATCHES "x86_64|AMD64")
-  set_source_files_properties(${wide} PROPERTIES SKIP_UNITY_BUILD_INCLUSION ON COMPILE_OPTIONS "${kernel};${unrig_wide_vectors}")
+  set_source_files_properties(${wide} PROPERTIES SKIP_PRECOMPILE_HEADERS ON COMPILE_OPTIONS "${kernel};${unrig_wide_vectors}")
   set_source_files_properties(${PROJECT_SOURCE_DIR}/core/numerics/triangularise_avx2.cpp ${PROJECT_SOURCE_DIR}/core/numerics/product_avx2.cpp PROPERTIES COMPILE_OPTIONS "${kernel};${unrig_wide_vectors_rounded}")
-  set_source_files_properties(${chosen} PROPERTIES SKIP_UNITY_BUILD_INCLUSION ON COMPILE_OPTIONS "${kernel}" COMPILE_DEFINITIONS UNRIG_WIDE_VECTORS)
+  set_source_files_properties(${chosen} PROPERTIES SKIP_PRECOMPILE_HEADERS ON COMPILE_OPTIONS "${kernel}" COMPILE_DEFINITIONS UNRIG_WIDE_VECTORS)
 else()
   set_source_files_properties(${wide} PROPERTIES HEADER_FILE_ONLY ON)
 endif()
-# Has a helper that is named like another's.
-set_source_files_properties(${PROJECT_SOURCE_DIR}/fit/trial/trial.cpp PROPERTIES SKIP_UNITY_BUILD_INCLUSION ON)
 
 add_library(unrig_sanitizers INTERFACE)
 target_compile_options(unrig_sanitizers INTERFACE ${unrig_sanitizers} ${careless_of_pointers})
@@ -57,7 +55,8 @@ foreach(floor core fit correct)
   list(FILTER below EXCLUDE REGEX "unrig_warnings")  # the floors themselves are compiled with warnings
   add_library(sanitised_${floor} STATIC ${sources})
   add_dependencies(sanitised_${floor} unrig_${floor})  # which makes the page of the report
-  set_target_properties(sanitised_${floor} PROPERTIES ${compiled_by_clang})  # file by file: helpers of one name stand in several of them
+  set_target_properties(sanitised_${floor} PROPERTIES ${compiled_by_clang})
+  target_precompile_headers(sanitised_${floor} PRIVATE precompiled.h)
   target_include_directories(sanitised_${floor} PUBLIC ${PROJECT_SOURCE_DIR})
   target_link_libraries(sanitised_${floor} PUBLIC ${below} unrig_sanitizers)
 endforeach()
