@@ -166,6 +166,10 @@ def main():
     if sets:
         seen = [t for t in sets if not t["hidden"] or size(t) >= VISIBLE]
         print(f"\nThe set of explanations holds the truth in {share(sum(map(held, sets)), len(sets))}, where nothing is hidden or size {VISIBLE} or more in {share(sum(map(held, seen)), len(seen))}; {statistics.mean(len(t['explanations']) for t in sets):.2f} members on the mean.")
+    for what, of in (("", trials), (" of campaigns with exact files", [t for t in trials if not t["misread"]])):
+        deviations = [abs(p["value"] - p["truth"]) / p["std_error"] for t in of for p in t.get("named", [])]
+        if deviations:
+            print(f"\nIntervals of parameters of hidden effects that were named{what}: 68 % hold the truth in {share(sum(d < 1 for d in deviations), len(deviations))}, 95 % in {share(sum(d < 1.96 for d in deviations), len(deviations))}.")
     print("\n| size | campaigns | " + " | ".join(columns) + " |\n" + "| --- " * (len(columns) + 2) + "|")
     for low, high in zip(BINS, BINS[1:]):
         own = [t for t in hidden if low <= size(t) < high]

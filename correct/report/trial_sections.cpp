@@ -85,6 +85,8 @@ void add_reliability(ReportPage& page, const json& reliability) {
                               plain(number_of(reliability, "calibration_error"), 3), plain(number_of(reliability, "brier"), 3)));
   if (const json explanations = reliability.value("explanations", json::object()); explanations.value("campaigns", 0) > 0)
     page.add_text(fmt::format("The explanations that were given hold what was hidden in {} of {} campaigns, with {} of them on the mean.", explanations.value("hold", 0), explanations.value("campaigns", 0), plain(number_of(explanations, "members"), 3)));
+  if (const json intervals = reliability.value("intervals", json::object()); intervals.value("parameters", 0) > 0)
+    page.add_text(fmt::format("Of {} parameters of hidden effects that were named the truth lies within one standard error of {} (68 % expected) and within 1.96 of {} (95 %).", intervals.value("parameters", 0), intervals.value("within_68", 0), intervals.value("within_95", 0)));
 }
 
 void add_failures(ReportPage& page, const json& trials) {

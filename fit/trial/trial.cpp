@@ -21,6 +21,7 @@
 #include "fit/trial/trial_campaign.h"
 #include "fit/trial/trial_files.h"
 #include "fit/effect_option.h"
+#include "fit/uncertainty/profile.h"
 
 namespace unrig {
 namespace {
@@ -132,6 +133,22 @@ void take_verdict(const Diagnosis& d, TrialOutcome& outcome) {
   for (const StatedExplanation& e : d.explanations) outcome.explanations.push_back(e.effects);
 }
 
+/// Parameters with their intervals of the hidden effects among those that are named.
+std::vector<NamedParameter> named_parameters(const Diagnosis& d, const TrialCampaign& campaign, const Rig& rig) {
+  std::vector<NamedParameter> named;
+  for (const MissingEffect& m : d.missing) {
+    if (!has(campaign.hidden, m.effect)) continue;
+    const std::vector<Parameter>& own = effect(rig, m.effect).parameters_on(rig);
+    for (const FittedParameter& p : m.parameters) {
+      const auto truth = campaign.truth.find(p.name);
+      if (!p.run.empty() || !p.identified || !(p.std_error > 0) || truth == campaign.truth.end()) continue;
+      const Parameter& as_listed = own[static_cast<std::size_t>(p.place)];
+      if (truth->second > as_listed.lower && truth->second < as_listed.upper) named.push_back({p.name, truth->second, p.value, p.std_error});
+    }
+  }
+  return named;
+}
+
 void try_effects(const TrialProblem& problem, const Strings& effects, std::mt19937_64& random, TrialOutcome& outcome) {
   const TrialCampaign campaign = draw(problem, problem.rig, plan(problem, problem.noise, random), {}, random, outcome);
   DiagnoseProblem diagnosis;
@@ -141,7 +158,9 @@ void try_effects(const TrialProblem& problem, const Strings& effects, std::mt199
   diagnosis.verdict_only = true;
   diagnosis.work = problem.work;
   if (problem.outside) std::erase_if(diagnosis.effects, [&](const std::string& id) { return has(outcome.hidden, id); });
-  take_verdict(diagnose(diagnosis), outcome);
+  const Diagnosis d = diagnose(diagnosis);
+  take_verdict(d, outcome);
+  outcome.named = named_parameters(d, campaign, problem.rig);
 }
 
 void try_law(const TrialProblem& problem, std::mt19937_64& random, TrialOutcome& outcome) {
@@ -222,6 +241,13 @@ Reliability reliability_of(const std::vector<TrialOutcome>& outcomes) {
     ++all.explained;
     all.held += o.held() ? 1 : 0;
     all.members += static_cast<double>(o.explanations.size());
+  }
+  for (const TrialOutcome& o : outcomes) {
+    for (const NamedParameter& p : o.named) {
+      ++all.parameters;
+      all.within_68 += p.deviation() < 1 ? 1 : 0;
+      all.within_95 += p.deviation() < two_sided_quantile(0.95) ? 1 : 0;
+    }
   }
   if (all.explained > 0) all.members /= all.explained;
   if (all.campaigns > 0) all.calibration_error /= all.campaigns, all.brier /= all.campaigns;

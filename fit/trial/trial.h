@@ -1,4 +1,5 @@
 #pragma once
+#include <cmath>
 #include <functional>
 #include <map>
 #include <optional>
@@ -33,6 +34,14 @@ struct TrialProblem {
   std::function<void(const std::string&)> progress;  ///< called from one thread at a time
 };
 
+/// What a diagnosis says of a parameter that all runs share, of an effect that it named and that was hidden.
+struct NamedParameter {
+  std::string name;
+  double truth = 0, value = 0, std_error = 0;
+
+  double deviation() const { return std::abs(value - truth) / std_error; }
+};
+
 /// One campaign and what became of it.
 struct TrialOutcome {
   std::size_t trial = 0;  ///< i of run_trials
@@ -45,6 +54,7 @@ struct TrialOutcome {
   std::string misread;         ///< group of the numbers by which the files are off; empty: none
   std::optional<double> probability;  ///< that the diagnosis gives what it found; none where nothing is named
   std::vector<std::vector<std::string>> explanations;  ///< effects of Diagnosis::explanations
+  std::vector<NamedParameter> named;  ///< those with a standard error whose truth does not lie on a bound, where no interval has two sides
   bool mismatch = false, unexplained = false;
   std::optional<LawOutcome> law;  ///< of a campaign with a law
   double seconds = 0, work = 0;  ///< that the diagnosis took, and Diagnosis::work
@@ -77,6 +87,7 @@ struct Reliability {
   double brier = 0;              ///< mean square of probability less 1 for a right, 0 for a wrong name
   int explained = 0, held = 0;   ///< campaigns that were diagnosed, and those of them of which the explanations hold the truth
   double members = 0;            ///< explanations on the mean
+  int parameters = 0, within_68 = 0, within_95 = 0;  ///< TrialOutcome::named of all campaigns, and how many of their intervals of 68 and 95 % hold the truth
 };
 
 struct TrialResult {

@@ -29,6 +29,8 @@ ordered_json json_of(const TrialOutcome& o, bool seconds) {
   one["misread"] = o.misread.empty() ? ordered_json(nullptr) : ordered_json(o.misread);
   one["probability"] = o.probability ? ordered_json(*o.probability) : ordered_json(nullptr);
   one["explanations"] = o.explanations;
+  one["named"] = ordered_json::array();
+  for (const NamedParameter& p : o.named) one["named"].push_back({{"name", p.name}, {"truth", p.truth}, {"value", p.value}, {"std_error", p.std_error}});
   if (o.law) one["law"] = json_of(*o.law);
   one["work"] = o.work;
   if (o.stopped) one["stopped"] = true;
@@ -52,6 +54,7 @@ TrialOutcome outcome_of(const ordered_json& json) {
   if (const ordered_json& misread = json.at("misread"); !misread.is_null()) misread.get_to(o.misread);
   if (const ordered_json& probability = json.at("probability"); !probability.is_null()) o.probability = probability.get<double>();
   o.explanations = json.value("explanations", o.explanations);
+  for (const ordered_json& p : json.value("named", ordered_json::array())) o.named.push_back({p.at("name").get<std::string>(), p.at("truth").get<double>(), p.at("value").get<double>(), p.at("std_error").get<double>()});
   if (json.contains("law")) o.law = law_outcome_of(json.at("law"));
   o.work = json.value("work", 0.0);
   o.stopped = json.value("stopped", false);
@@ -63,7 +66,8 @@ TrialOutcome outcome_of(const ordered_json& json) {
 ordered_json json_of(const Reliability& r) {
   ordered_json bins = ordered_json::array();
   for (const Reliability::Bin& b : r.bins) bins.push_back({{"from", b.from}, {"to", b.to}, {"campaigns", b.campaigns}, {"stated", b.stated}, {"right", b.right}});
-  return {{"campaigns", r.campaigns}, {"calibration_error", r.calibration_error}, {"brier", r.brier}, {"bins", bins}, {"explanations", {{"campaigns", r.explained}, {"hold", r.held}, {"members", r.members}}}};
+  return {{"campaigns", r.campaigns}, {"calibration_error", r.calibration_error}, {"brier", r.brier}, {"bins", bins}, {"explanations", {{"campaigns", r.explained}, {"hold", r.held}, {"members", r.members}}},
+          {"intervals", {{"parameters", r.parameters}, {"within_68", r.within_68}, {"within_95", r.within_95}}}};
 }
 
 }  // namespace
@@ -98,6 +102,8 @@ std::string report(const TrialResult& r) {
   }
   if (r.reliability.explained > 0)
     text += fmt::format("[[Explanations]] hold what was hidden in {} of {} campaigns, with {:.2f} members on the mean\n", r.reliability.held, r.reliability.explained, r.reliability.members);
+  if (const Reliability& s = r.reliability; s.parameters > 0)
+    text += fmt::format("[[Intervals]] of parameters of hidden effects that were named: 68 % hold the truth in {} of {}, 95 % in {}\n", s.within_68, s.parameters, s.within_95);
   if (r.laws) text += report(*r.laws);
   for (const TrialOutcome& o : r.outcomes)
     if (!o.failure.empty()) text += fmt::format("    failed with {} hidden: {}\n", name_of(o.hidden), o.failure);

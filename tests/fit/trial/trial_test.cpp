@@ -133,6 +133,12 @@ TEST(Trial, NothingHiddenAndAWave) {
   EXPECT_EQ(result.confusion.at("tank-wave").at("tank-wave"), 1);
   const nlohmann::json json = nlohmann::json::parse(to_json(result));
   EXPECT_EQ(json["trials"][1]["found"][0], "tank-wave");
+  EXPECT_THAT(result.outcomes[0].named, IsEmpty());
+  ASSERT_EQ(result.outcomes[1].named.size(), 1u);
+  EXPECT_EQ(result.outcomes[1].named[0].truth, result.outcomes[1].parameters[0]);
+  EXPECT_LT(result.outcomes[1].named[0].deviation(), 4);
+  EXPECT_EQ(json["trials"][1]["named"][0]["name"], result.outcomes[1].named[0].name);
+  EXPECT_EQ(json["reliability"]["intervals"]["parameters"], 1);
   EXPECT_THAT(report(result), HasSubstr("0 false alarms in 1 campaigns"));
 }
 
@@ -205,6 +211,18 @@ TEST(Trial, CountsWhetherExplanationsHoldTheTruth) {
   EXPECT_EQ(result.reliability.explained, 4);
   EXPECT_EQ(result.reliability.held, 3);
   EXPECT_NEAR(result.reliability.members, 7 / 4.0, 1e-12);
+}
+
+/// Deviations of 0.5, 1.5 and 2.5 standard errors.
+TEST(Trial, CountsWhetherIntervalsHoldTheTruth) {
+  TrialResult result;
+  result.outcomes.resize(2);
+  result.outcomes[0].named = {{"a", 3, 3.5, 1}, {"b", 3, 0, 2}};
+  result.outcomes[1].named = {{"a", -1, -1.25, 0.1}};
+  tally(result);
+  EXPECT_EQ(result.reliability.parameters, 3);
+  EXPECT_EQ(result.reliability.within_68, 1);
+  EXPECT_EQ(result.reliability.within_95, 2);
 }
 
 TEST(Trial, RefusesARigThatCannotBePitched) {
