@@ -66,7 +66,7 @@ double off_the_cubic(const VectorXd& x, const std::vector<bool>& out, Index k) {
 
 }  // namespace
 
-MotionBasis::MotionBasis(Index samples, double dt, std::vector<Window> windows) : samples_(samples), dt_(dt), windows_(std::move(windows)) {
+MotionBasis::MotionBasis(Index samples, std::vector<Window> windows) : samples_(samples), windows_(std::move(windows)) {
   for (std::size_t w = 0; w < windows_.size(); ++w) {
     const Window& window = windows_[w];
     if (window.stride < 1 || window.knots.first < 0 || window.knots.length() < window.stride)
@@ -287,26 +287,58 @@ void widen(std::vector<Interval>& intervals, const VectorXd& smooth, Index reach
   }
 }
 
+constexpr double chance = 8;      // standard deviations
+constexpr double one_code = 1.5;  // quanta: a quiet converter that changes by one is no motion
+
+VectorXd running_sum(const VectorXd& x) {
+  VectorXd sum = VectorXd::Zero(x.size() + 1);
+  for (Index k = 0; k < x.size(); ++k) sum[k + 1] = sum[k] + x[k];
+  return sum;
+}
+
+/// By how much the mean over `m` samples behind sample k differs from that over as many before it.
+double change_of_means(const VectorXd& sum, Index m, Index k) { return std::abs(sum[k + m] - 2 * sum[k] + sum[k - m]) / static_cast<double>(m); }
+
+/// What is white in it.
+double white_change(double sigma, Index m) { return sigma * std::sqrt(2 / static_cast<double>(m)); }
+
+/// Whether the shaft moves all the time. Means of m samples change by m times the rate where the motion is smooth, and like the square root of m where a channel wanders (a random walk): from m / 4 to the shortest m
+/// at which the median change is clearly more than noise by four, or by two. The limit lies half-way, in the logarithm.
+bool moves_without_a_rest(const VectorXd& angle, double sigma, double quantum) {
+  constexpr Index shortest = 16, fewest = 40;  // samples in a mean; means
+  const double half_way = std::sqrt(2.0 * 4.0);
+  const VectorXd sum = running_sum(angle);
+  const auto usual_change = [&](Index m) {
+    std::vector<double> change;
+    for (Index k = m; k + m <= angle.size(); k += m / 4) change.push_back(change_of_means(sum, m, k));
+    return median_to_sigma * median(change);
+  };
+  for (Index m = shortest; m * fewest <= angle.size(); m *= 2) {
+    const double change = usual_change(m);
+    if (change < std::max(chance * white_change(sigma, m), one_code * quantum)) continue;
+    const double white = white_change(sigma, m / 4), before = usual_change(m / 4);
+    return change * change > half_way * half_way * (before * before - white * white);
+  }
+  return false;
+}
+
 /// Slow motions far from those that are known: means over `m` samples that differ from those before by more than chance, and by more than what a channel that wanders does everywhere.
 std::vector<Interval> moving_slowly(const VectorXd& angle, double sigma, double quantum, Index m, const std::vector<Interval>& known) {
   constexpr Index beside = 500;  // samples: how a motion begins and ends softly is for others to see
   constexpr std::size_t enough = 40;
-  constexpr double chance = 8;      // standard deviations
-  constexpr double one_code = 1.5;  // quanta: a quiet converter that changes by one is no motion
   const Index n = angle.size();
-  VectorXd sum = VectorXd::Zero(n + 1);
-  for (Index k = 0; k < n; ++k) sum[k + 1] = sum[k] + angle[k];
+  const VectorXd sum = running_sum(angle);
   const auto near_known = [&](Index k) { return std::any_of(known.begin(), known.end(), [&](const Interval& i) { return k + m + beside > i.first && k - m - beside < i.last; }); };
   std::vector<Index> at;
   std::vector<double> change;
   for (Index k = m; k + m <= n; k += m / 4) {
     if (near_known(k)) continue;
     at.push_back(k);
-    change.push_back(std::abs(sum[k + m] - 2 * sum[k] + sum[k - m]) / static_cast<double>(m));
+    change.push_back(change_of_means(sum, m, k));
   }
   if (change.size() < enough) return {};
   std::vector<double> sorted = change;
-  const double least = std::max(chance * std::max(sigma * std::sqrt(2 / static_cast<double>(m)), median_to_sigma * median(sorted)), one_code * quantum);
+  const double least = std::max(chance * std::max(white_change(sigma, m), median_to_sigma * median(sorted)), one_code * quantum);
   std::vector<Interval> intervals;
   for (std::size_t i = 0; i < at.size(); ++i) {
     if (!(change[i] > least)) continue;
@@ -342,6 +374,7 @@ std::vector<Interval> moving(const VectorXd& angle, double sigma) {
   if (!smooth.allFinite()) return intervals;
   constexpr double hardly = 18;
   const double quantum = std::sqrt(12.0) * rounding_level(angle);
+  if (moves_without_a_rest(angle.array().isFinite().select(angle, smooth), sigma, quantum)) return {{0, n}};
   widen(intervals, smooth, reach, hardly * sigma);
   for (const Index m : {16, 64, 256}) {
     const std::vector<Interval> slow = moving_slowly(smooth, sigma, quantum, m, intervals);

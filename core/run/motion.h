@@ -22,7 +22,7 @@ class MotionBasis {
     Interval knots;  ///< free fine knots [first, last)
     Eigen::Index stride = 1;
   };
-  MotionBasis(Eigen::Index samples, double dt, std::vector<Window> windows);
+  MotionBasis(Eigen::Index samples, std::vector<Window> windows);
 
   Eigen::Index samples() const { return samples_; }
   Eigen::Index unknowns() const { return static_cast<Eigen::Index>(columns_.size()); }
@@ -50,7 +50,6 @@ class MotionBasis {
 
  private:
   Eigen::Index samples_;
-  double dt_;
   std::vector<Window> windows_;
   std::vector<Column> columns_;
 };
@@ -81,7 +80,7 @@ double rounding_level(const Eigen::VectorXd& channel);
 std::vector<bool> isolated_spikes(const Eigen::VectorXd& channel, double sigma, const std::vector<Interval>& motion, double limit = 6);
 
 /// Where the shaft moves: samples whose median-filtered angle changes by more than the noise allows within six, merged where they nearly touch, and widened where they hardly stand out
-/// of it; and, far from these, where its means over 16, 64 or 256 samples change by more than noise and wandering do elsewhere.
+/// of it; and, far from these, where its means over 16, 64 or 256 samples change by more than noise and wandering do elsewhere. The whole record where they change smoothly nearly everywhere.
 std::vector<Interval> moving(const Eigen::VectorXd& angle, double sigma);
 
 }  // namespace unrig

@@ -155,19 +155,7 @@ bool RunResidual::stack_nonlinear_rows(Linearised& lin, const VectorXd& theta, c
       from.start = response.end;
     }
     MatrixXd moves;
-    if (!rows.is_last() && (moved || splines.end > 0)) {
-      const Splines& next = pieces_[p + 1].splines;
-      const Index own = splines.own(), open = splines.open();
-      const auto place = [&](Index spline) { return spline >= splines.begin ? spline - splines.begin : own + with_filters + 1 + spline - splines.still; };
-      moves = MatrixXd::Zero(with_filters + 1 + next.open(), own + (moved ? with_filters + 1 + open : 0));
-      if (moved) {
-        moves.block(0, own, with_filters, with_filters) = end.leftCols(with_filters);
-        moves(with_filters, own + with_filters) = 1;
-      }
-      for (Index j = 0; j < acting; ++j) moves.col(place(splines.still + j)).head(with_filters) = end.col(states + j);
-      for (Index j = splines.still; j < next.still; ++j) moves(with_filters, place(j)) = motion_.columns()[static_cast<std::size_t>(j)].tail;
-      for (Index j = next.still; j < next.begin; ++j) moves(with_filters + 1 + j - next.still, place(j)) = 1;
-    }
+    if (!rows.is_last() && (moved || splines.end > 0)) moves = transition(piece, moved, pieces_[p + 1].splines, end.leftCols(states), end.rightCols(acting));
     rows.end_piece(moved, std::move(moves));
     start = states > 0 ? product(end.leftCols(states), start) : MatrixXd(MatrixXd::Zero(with_filters, unknowns_));
     start.middleCols(splines.still, acting) += end.rightCols(acting);

@@ -134,13 +134,20 @@ VectorXd RunResidual::motion_state(const Linearised& lin, Index spline, Index at
   return state;
 }
 
+/// The same of splines [first, last), a column each.
+MatrixXd RunResidual::motion_states(const Linearised& lin, Index first, Index last, Index at) const {
+  MatrixXd states(lin.spline.rows(), last - first);
+  for (Index j = first; j < last; ++j) states.col(j - first) = motion_state(lin, j, at);
+  return states;
+}
+
 /// d state / d c behind a piece, from that at its start: by the splines that stand still there, or, where the record ends, by all.
 MatrixXd RunResidual::state_behind(const Linearised& lin, const Piece& piece, const Interval& samples, const MatrixXd& leap, const MatrixXd& start) const {
   MatrixXd behind = product(leap, start);
   if (!piece.moving) return behind;
   const bool ends = samples.last == run_->samples();
   const Index last = ends ? piece.splines.end : std::min(first_open(samples.last), piece.splines.end);
-  for (Index j = piece.splines.still; j < last; ++j) behind.col(j) += motion_state(lin, j, samples.last);
+  behind.middleCols(piece.splines.still, last - piece.splines.still) += motion_states(lin, piece.splines.still, last, samples.last);
   if (ends || motion_.unknowns() == 0) return behind;
   RowVectorXd angle = RowVectorXd::Zero(start.cols());
   angle.head(last) = level_before(last);
@@ -149,24 +156,19 @@ MatrixXd RunResidual::state_behind(const Linearised& lin, const Piece& piece, co
   return behind;
 }
 
-/// The state [x | level of the angle | splines that act still] behind a piece over [its own splines | that at its start], x without the splines that act still.
-MatrixXd RunResidual::transition(const Linearised& lin, const Piece& piece, bool has_state, const Splines& next, const MatrixXd& leap) const {
+/// The state [x | level of the angle | splines that act still] behind a piece over [its own splines | that at its start]. `leap`: x there over x at the start; `by_splines`: over the first of those that act.
+MatrixXd RunResidual::transition(const Piece& piece, bool has_state, const Splines& next, const MatrixXd& leap, const MatrixXd& by_splines) const {
   const Splines& here = piece.splines;
-  const Index n = lin.system.states(), own = here.own();
+  const Index n = by_splines.rows(), own = here.own();
   const auto place = [&](Index spline) { return spline >= here.begin ? spline - here.begin : own + n + 1 + spline - here.still; };
   MatrixXd moves = MatrixXd::Zero(n + 1 + next.open(), own + (has_state ? n + 1 + here.open() : 0));
   if (has_state) {
     moves.block(0, own, n, n) = leap;
     moves(n, own + n) = 1;
   }
-  for (Index j = here.still; j < next.still; ++j) {
-    moves.col(place(j)).head(n) = motion_state(lin, j, piece.samples.last);
-    moves(n, place(j)) = motion_.columns()[static_cast<std::size_t>(j)].tail;
-  }
+  for (Index j = 0; j < by_splines.cols(); ++j) moves.col(place(here.still + j)).head(n) = by_splines.col(j);
+  for (Index j = here.still; j < next.still; ++j) moves(n, place(j)) = motion_.columns()[static_cast<std::size_t>(j)].tail;
   for (Index j = next.still; j < next.begin; ++j) moves(n + 1 + j - next.still, place(j)) = 1;
-  if (!piece.moving) return moves;
-  moves.row(lin.system.motion) = moves.row(n);
-  moves.middleRows(lin.system.motion + 1, 2).setZero();
   return moves;
 }
 

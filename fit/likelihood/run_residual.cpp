@@ -177,7 +177,7 @@ RunResidual::RunResidual(const AeroelasticModel& model, const Run& run, std::vec
       run_(&run),
       conditions_(options.conditions.value_or(conditions_of(run))),
       channels_(model.output_channels(run)),
-      motion_(run.samples(), run.dt, motion) {
+      motion_(run.samples(), motion) {
   check_what_drives(run);
   conditions_.prescribed_pitch = motion_.unknowns() > 0;
   const Index n = run.samples();

@@ -314,7 +314,8 @@ class RunResidual {
   Eigen::Index first_open(Eigen::Index at) const;
   Eigen::VectorXd motion_state(const Linearised& lin, Eigen::Index spline, Eigen::Index at) const;
   Eigen::MatrixXd state_behind(const Linearised& lin, const Piece& piece, const Interval& samples, const Eigen::MatrixXd& leap, const Eigen::MatrixXd& start) const;
-  Eigen::MatrixXd transition(const Linearised& lin, const Piece& piece, bool has_state, const Splines& next, const Eigen::MatrixXd& leap) const;
+  Eigen::MatrixXd motion_states(const Linearised& lin, Eigen::Index first, Eigen::Index last, Eigen::Index at) const;
+  Eigen::MatrixXd transition(const Piece& piece, bool has_state, const Splines& next, const Eigen::MatrixXd& leap, const Eigen::MatrixXd& by_splines) const;
   Eigen::RowVectorXd level_before(Eigen::Index spline) const;
   std::size_t counted_pieces() const;
   bool has_state(const Piece& piece, const Eigen::MatrixXd& start) const { return piece.splines.begin > 0 || !start.isZero(0); }

@@ -217,8 +217,16 @@ void RunResidual::stack_rows(Linearised& lin) const {
       lin.blocks.push_back(std::move(block));
     }
     if (s.length() > 0 && s.length() != leaps) leap = power(lin.step.transition.value, leaps = s.length());
-    const bool moves_next = !rows.is_last() && (moved || piece.splines.end > 0);
-    rows.end_piece(moved, moves_next ? transition(lin, piece, moved, pieces_[p + 1].splines, leap) : MatrixXd());
+    MatrixXd moves;
+    if (!rows.is_last() && (moved || piece.splines.end > 0)) {
+      const Splines& next = pieces_[p + 1].splines;
+      moves = transition(piece, moved, next, leap, motion_states(lin, piece.splines.still, next.still, piece.samples.last));
+      if (piece.moving) {  // what the splines do that act still is added as long as they do: without them the shaft stands
+        moves.row(lin.system.motion) = moves.row(lin.system.states());
+        moves.middleRows(lin.system.motion + 1, 2).setZero();
+      }
+    }
+    rows.end_piece(moved, std::move(moves));
     if (s.length() > 0) start = state_behind(lin, piece, s, leap, start);
   }
   lin.end = start;

@@ -16,7 +16,7 @@ std::optional<ShaftMotion> shaft_motion(const Rig& rig, const Run& run) {
   if (windows.empty() || windows.front().stride > 1) return std::nullopt;
   const VectorXd measured = run.channel("alpha").value;
   double scatter = 0;  // at rest
-  for (const MotionBasis::Phase& phase : MotionBasis(run.samples(), run.dt, windows).phases())
+  for (const MotionBasis::Phase& phase : MotionBasis(run.samples(), windows).phases())
     if (!phase.moving && phase.samples.length() > 0)
       scatter = std::max(scatter, (measured.segment(phase.samples.first, phase.samples.length()).array() - measured[phase.samples.first]).abs().maxCoeff());
   if (!(scatter > 0)) return std::nullopt;

@@ -40,9 +40,9 @@ bool any_aside(const JointProblem& joint);
 
 /// Whether nonlinear effects are at work in any of the runs.
 bool nonlinear(const Trial& trial);
-/// Whether the last effect is such a law.
-bool brings_a_law(const Trial& trial);
+/// Whether an effect is such a law in any of them; and whether the last one is.
 bool is_a_law(const std::string& id, const JointProblem& joint);
+bool brings_a_law(const Trial& trial);
 
 /// Whether an effect is a signal with amplitudes of its own in each run, which take a share of anything that lies at its frequencies.
 bool is_a_signal(const std::string& id, const JointProblem& joint);

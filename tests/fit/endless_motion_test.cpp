@@ -137,6 +137,16 @@ TEST(EndlessMotion, OfNineHundredKnotsIsFitted) {
   expect_truth(campaign, fit(campaign.problem()));
 }
 
+/// Up to 0.6 Hz by a degree and less: the angle changes by less than its noise from sample to sample, everywhere alike. It was taken for one that stands still and wanders.
+TEST(EndlessMotion, ThatIsSlowIsFitted) {
+  Simulated campaign(of_the_rig, {});
+  campaign.add(read_run(sample("dry_pluck.csv")));
+  campaign.add(read_run(sample("wet_pluck.csv")));
+  campaign.add_restless(3000, 0.6);
+  ASSERT_EQ(windows_to_fit(campaign.problem().runs[2]).size(), 1u);
+  expect_truth(campaign, fit(campaign.problem()));
+}
+
 /// Dry friction in the rig turns each time that the section does, while the shaft moves from the beginning of the record to its end.
 TEST(EndlessMotion, WithFrictionInTheRigIsFitted) {
   std::map<std::string, double> truth = of_the_rig;

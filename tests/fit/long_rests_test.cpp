@@ -13,7 +13,7 @@ namespace {
 /// Two steps with long rests behind them, over which nothing is left but a slow decay.
 Case long_rests(Index length) {
   Case c{"long rests", beam_model(), empty_run(RunKind::step, 0.6, dt), {{{40, 64}, 1}, {{length / 2, length / 2 + 18}, 1}}, {}};
-  const MotionBasis basis(length, dt, c.windows);
+  const MotionBasis basis(length, c.windows);
   VectorXd u = VectorXd::Zero(basis.unknowns());
   for (Index j = 0; j < basis.unknowns(); ++j) u[j] = j < 25 ? 0.026 * std::min(1.0, static_cast<double>(j) / 20) : -0.01 * std::min(1.0, static_cast<double>(j - 25) / 12);
   const VectorXd motion = basis.coefficients(u);

@@ -123,7 +123,7 @@ inline Case pluck(const std::vector<std::string>& channels) {
 /// A step of 1.5 degrees within 40 ms and a smaller one back, angle noise of 0.01 degrees; splines on every `stride`-th sample.
 inline Case step(Index stride) {
   Case c{"step, stride " + std::to_string(stride), beam_model(), empty_run(RunKind::step, 0.6, dt), {{{40, 64}, stride}, {{140, 158}, stride}}, {}};
-  const MotionBasis basis(samples, dt, c.windows);
+  const MotionBasis basis(samples, c.windows);
   VectorXd u(basis.unknowns());
   Index j = 0;
   for (const auto& window : c.windows) {
@@ -144,7 +144,7 @@ inline Case step(Index stride) {
 /// A shaft that hardly rests: a motion of many knots.
 inline Case restless(Index stride) {
   Case c{"restless, stride " + std::to_string(stride), beam_model(), empty_run(RunKind::step, 0.6, dt), {{{20, 212}, stride}}, {}};
-  const MotionBasis basis(samples, dt, c.windows);
+  const MotionBasis basis(samples, c.windows);
   VectorXd u(basis.unknowns());
   for (Index j = 0; j < u.size(); ++j) {
     const double knot = static_cast<double>(j * stride), begins = std::min(1.0, knot / 40);

@@ -289,7 +289,7 @@ TEST(AeroelasticModel, AVeryStiffRigReadsTheRigidLoad) {
   const double dt = 0.002, at_gauge = rig.station[rig.gauge_element - 1], lever = rig.station[rig.calibration_element - 1] - at_gauge;
   constexpr Index samples = 300, rise = 20;
   const Conditions conditions = stream(0.6);
-  const MotionBasis basis(samples, dt, {{{40, 40 + rise}, 1}});
+  const MotionBasis basis(samples, {{{40, 40 + rise}, 1}});
   const VectorXd u = turn(rise + 1, 0, rise, 0.03);
   const Motion motion = motion_of(basis.coefficients(u), dt);
 

@@ -66,7 +66,7 @@ TEST(RigidLoad, IsThatOfTheSimulatedCampaign) {
     Index first = 0, last = angle.size() - 1;
     while (angle[first] == angle[0]) ++first;
     while (angle[last] == angle[angle.size() - 1]) --last;
-    const MotionBasis motion(angle.size(), run.dt, {{{first - 24, last + 20}, 1}});
+    const MotionBasis motion(angle.size(), {{{first - 24, last + 20}, 1}});
     const Interval window{first - 30, last + 30};
     const MatrixXd columns = motion.angle_columns(window);
     const VectorXd u = columns.colPivHouseholderQr().solve((angle.segment(window.first, window.length()).array() - angle[0]).matrix());
@@ -83,7 +83,7 @@ TEST(RigidLoad, IsThatOfTheSimulatedCampaign) {
 TEST(RigidLoad, CarriesItsSlopes) {
   const AeroelasticModel model = model_of_null(Wagner::jones, AeroelasticModel::Circulation::free);
   const double dt = 0.002;
-  const MotionBasis motion(80, dt, {{{10, 14}, 1}, {{40, 46}, 2}});
+  const MotionBasis motion(80, {{{10, 14}, 1}, {{40, 46}, 2}});
   const VectorXd u = VectorXd::LinSpaced(motion.unknowns(), -0.01, 0.02), theta = theta_of(model, 5.9);
   Conditions conditions;
   conditions.density = 998.2;
@@ -108,7 +108,7 @@ TEST(RigidLoad, GoesOnFromAnother) {
   Conditions conditions;
   conditions.density = 998.2;
   conditions.speed = 0.6;
-  const MotionBasis whole(300, dt, {{{10, 30}, 1}, {{150, 170}, 1}}), first(120, dt, {{{10, 30}, 1}}), second(180, dt, {{{30, 50}, 1}});
+  const MotionBasis whole(300, {{{10, 30}, 1}, {{150, 170}, 1}}), first(120, {{{10, 30}, 1}}), second(180, {{{30, 50}, 1}});
   const VectorXd u = VectorXd::LinSpaced(whole.unknowns(), -0.01, 0.02), theta = theta_of(model, 5.9);
   const Index own = first.unknowns();
   const RigidLoad expected = rigid_load(model, conditions, theta, whole, dt, u);
@@ -129,7 +129,7 @@ TEST(RigidLoad, OfAShaftAtRestSettles) {
   const AeroelasticModel model = model_of_null(Wagner::jones);
   const double dt = 0.002;
   const Index samples = 400000, last = samples - 1;
-  const MotionBasis motion(samples, dt, {{{10, 40}, 1}, {{100000, 100030}, 1}});
+  const MotionBasis motion(samples, {{{10, 40}, 1}, {{100000, 100030}, 1}});
   const VectorXd u = VectorXd::LinSpaced(motion.unknowns(), 0.01, 0.02);
   Conditions conditions;
   conditions.density = 998.2;
@@ -147,7 +147,7 @@ TEST(RigidLoad, OfAShaftAtRestSettles) {
 TEST(RigidLoad, InStillWaterIsInertiaAlone) {
   const AeroelasticModel model = model_of_null(Wagner::jones);
   const double dt = 0.002;
-  const MotionBasis motion(60, dt, {{{10, 20}, 1}});
+  const MotionBasis motion(60, {{{10, 20}, 1}});
   const VectorXd u = VectorXd::LinSpaced(motion.unknowns(), 0, 0.02);
   Conditions conditions;
   conditions.density = 998.2;
@@ -163,7 +163,7 @@ TEST(RigidLoad, NeedsASection) {
   Rig rig;
   rig.modal = {{1, 5, 0.01, 1, "N"}};
   const AeroelasticModel model(rig, {}, wagner(Wagner::jones));
-  EXPECT_THROW(rigid_load(model, {}, model.start_values(), MotionBasis(20, 0.1, {{{2, 6}, 1}}), 0.1, VectorXd::Zero(5)), std::invalid_argument);
+  EXPECT_THROW(rigid_load(model, {}, model.start_values(), MotionBasis(20, {{{2, 6}, 1}}), 0.1, VectorXd::Zero(5)), std::invalid_argument);
 }
 
 }  // namespace

@@ -71,7 +71,7 @@ TEST(MotionOf, EqualCoefficientsAreAnAngleAtRest) {
 
 TEST(MotionBasis, ColumnsAreTheMotionsOfTheUnknowns) {
   for (const Index stride : {1, 2, 3}) {
-    const MotionBasis basis(80, 0.01, {{{10, 10 + 4 * stride}, stride}, {{45, 45 + 3 * stride}, stride}});
+    const MotionBasis basis(80, {{{10, 10 + 4 * stride}, stride}, {{45, 45 + 3 * stride}, stride}});
     ASSERT_EQ(basis.unknowns(), 4 + 1 + 3 + 1);  // a level follows each window
     const MatrixXd columns = basis.angle_columns({0, 80}), part = basis.angle_columns({20, 60});
     EXPECT_EQ(part, columns.middleRows(20, 40));
@@ -85,7 +85,7 @@ TEST(MotionBasis, ColumnsAreTheMotionsOfTheUnknowns) {
 TEST(MotionBasis, CoarserSplinesAreExactSumsOfFineOnes) {
   for (const Index stride : {1, 2, 3, 5}) {
     constexpr Index samples = 60, first = 7, count = 6;
-    const MotionBasis basis(samples, 0.01, {{{first, first + count * stride}, stride}});
+    const MotionBasis basis(samples, {{{first, first + count * stride}, stride}});
     ASSERT_EQ(basis.unknowns(), count + 1);
     const MatrixXd columns = basis.angle_columns({0, samples});
     for (Index j = 0; j < count; ++j)
@@ -99,7 +99,7 @@ TEST(MotionBasis, CoarserSplinesAreExactSumsOfFineOnes) {
 TEST(MotionBasis, LevelIsEveryFurtherSplineAtOnce) {
   for (const Index stride : {1, 2, 3}) {
     constexpr Index samples = 70, first = 5, count = 4;
-    const MotionBasis basis(samples, 0.01, {{{first, first + count * stride}, stride}});
+    const MotionBasis basis(samples, {{{first, first + count * stride}, stride}});
     const VectorXd level = basis.angle_columns({0, samples}).col(count);
     for (Index k = 0; k < samples; ++k) {
       double expected = 0;
@@ -115,7 +115,7 @@ TEST(MotionBasis, LevelIsEveryFurtherSplineAtOnce) {
 
 TEST(MotionBasis, NothingMovesOutsideTheActiveSamples) {
   for (const Index stride : {1, 2}) {
-    const MotionBasis basis(100, 0.01, {{{10, 20}, stride}, {{60, 70}, stride}});
+    const MotionBasis basis(100, {{{10, 20}, stride}, {{60, 70}, stride}});
     const std::vector<Interval> active = basis.active();
     ASSERT_EQ(active.size(), 2u);
     const Motion m = motion_of(basis.coefficients(white_noise(basis.unknowns(), 1, 3)), 0.01);
@@ -128,10 +128,10 @@ TEST(MotionBasis, NothingMovesOutsideTheActiveSamples) {
 }
 
 TEST(MotionBasis, RefusesAWindowWithoutKnots) {
-  EXPECT_THROW(MotionBasis(50, 0.01, {{{10, 10}, 1}}), std::invalid_argument);
-  EXPECT_THROW(MotionBasis(50, 0.01, {{{10, 12}, 3}}), std::invalid_argument);
-  EXPECT_THROW(MotionBasis(50, 0.01, {{{10, 20}, 0}}), std::invalid_argument);
-  EXPECT_THROW(MotionBasis(50, 0.01, {{{-1, 20}, 1}}), std::invalid_argument);
+  EXPECT_THROW(MotionBasis(50, {{{10, 10}, 1}}), std::invalid_argument);
+  EXPECT_THROW(MotionBasis(50, {{{10, 12}, 3}}), std::invalid_argument);
+  EXPECT_THROW(MotionBasis(50, {{{10, 20}, 0}}), std::invalid_argument);
+  EXPECT_THROW(MotionBasis(50, {{{-1, 20}, 1}}), std::invalid_argument);
 }
 
 // ---------------------------------------------------------------------------------------------------------------- noise
@@ -313,6 +313,45 @@ TEST(Moving, TakesNoWanderingForMotion) {
     double walk = 0;
     for (Index k = 0; k < angle.size(); ++k) angle[k] += walk += steps[k] - 0.001 * walk;  // by 0.011, within some thousand samples
     EXPECT_TRUE(moving(angle, 0.01).empty()) << "seed " << seed;
+  }
+}
+
+/// Swings, together and one by one, that change by less than the noise from sample to sample, and a ramp through most of the record: all of it moves, and nothing stands out.
+TEST(Moving, FindsWhatNeverRests) {
+  const auto expect_whole = [](const VectorXd& angle, const char* what) {
+    const std::vector<Interval> found = moving(angle, 0.01);
+    ASSERT_EQ(found.size(), 1u) << what;
+    EXPECT_EQ(found[0].first, 0) << what;
+    EXPECT_EQ(found[0].last, angle.size()) << what;
+  };
+  VectorXd several = white_noise(length, 0.01, 61), ramp = white_noise(length, 0.01, 62);
+  for (const double period : {400.0, 1500.0}) {
+    VectorXd one = white_noise(length, 0.01, 60);
+    for (Index k = 0; k < length; ++k) one[k] += 0.4 * std::sin(2 * pi * static_cast<double>(k) / period);
+    one[700] = nan;
+    one[900] += 1;
+    expect_whole(one, "a swing");
+    for (Index k = 0; k < length; ++k) several[k] += 0.2 * std::sin(2 * pi * static_cast<double>(k) / period + 1);
+  }
+  expect_whole(several, "two swings");
+  for (Index k = 0; k < length; ++k) ramp[k] += std::clamp(0.002 * static_cast<double>(k - length / 8), 0.0, 0.002 * 0.75 * static_cast<double>(length));
+  expect_whole(ramp, "a ramp");
+}
+
+/// A random walk ten times as large as the noise over the record, and noise of equal power in every octave.
+TEST(Moving, TakesNoLargeWanderingForMotion) {
+  for (unsigned seed = 1; seed <= 10; ++seed) {
+    const VectorXd steps = white_noise(4 * length, 0.002, 400 + seed);
+    VectorXd walk = white_noise(4 * length, 0.01, 500 + seed), octaves = white_noise(4 * length, 0.01, 600 + seed);
+    double at = 0;
+    for (Index k = 0; k < walk.size(); ++k) walk[k] += at += steps[k];
+    EXPECT_TRUE(moving(walk, 0.01).empty()) << "seed " << seed;
+    for (double period = 64; period < 8000; period *= 2) {
+      const VectorXd fresh = white_noise(4 * length, 0.01, 700 + seed + static_cast<unsigned>(period));
+      double part = 0;
+      for (Index k = 0; k < octaves.size(); ++k) octaves[k] += part += (fresh[k] * std::sqrt(2 * period) - part) / period;
+    }
+    EXPECT_TRUE(moving(octaves, noise_level(octaves)).empty()) << "seed " << seed;
   }
 }
 

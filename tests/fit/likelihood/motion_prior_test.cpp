@@ -20,7 +20,7 @@ using run_cases::Case;
 /// A run whose shaft moves in two windows by splines with these coefficients, `factor` times all of it: motion, loads and noise.
 Case shaken(const std::vector<MotionBasis::Window>& windows, const VectorXd& u, double factor) {
   Case c{"shaken", run_cases::beam_model(), run_cases::empty_run(RunKind::step, 0.6, run_cases::dt), windows, {}};
-  const VectorXd motion = MotionBasis(run_cases::samples, run_cases::dt, windows).coefficients(u);
+  const VectorXd motion = MotionBasis(run_cases::samples, windows).coefficients(u);
   constexpr double angle_noise = 1e-5;  // far below what the motion does from knot to knot: then its differences are known
   run_cases::add_channel(c.run, "alpha", factor * ((motion_of(motion, run_cases::dt).angle + run_cases::white_noise(run_cases::samples, angle_noise, 7)).array() + 0.04).matrix(), "rad");
   c.theta = c.model->start_values();
@@ -31,7 +31,7 @@ Case shaken(const std::vector<MotionBasis::Window>& windows, const VectorXd& u, 
 const std::vector<MotionBasis::Window> windows{{{40, 80}, 1}, {{140, 190}, 1}};
 
 /// Coefficients that are independent of each other, so that fourth differences have 70 times their variance (1, -4, 6, -4, 1).
-VectorXd rough(double deviation) { return run_cases::white_noise(MotionBasis(run_cases::samples, run_cases::dt, windows).unknowns(), deviation, 3); }
+VectorXd rough(double deviation) { return run_cases::white_noise(MotionBasis(run_cases::samples, windows).unknowns(), deviation, 3); }
 
 TEST(MotionPrior, HasNothingToSayOfADecay) {
   const Case c = run_cases::pluck({"gauge"});

@@ -359,7 +359,7 @@ TEST(MotionWindows, OfAShaftThatWandersHaveAKnotEach) {
       EXPECT_GT(windows[w].knots.first, windows[w - 1].knots.last);
     }
   }
-  EXPECT_NO_THROW(MotionBasis(run.samples(), run.dt, windows));
+  EXPECT_NO_THROW(MotionBasis(run.samples(), windows));
 }
 
 /// They never change, and the fit after ten seconds of search ended in "a transform needs finite samples".
