@@ -296,30 +296,35 @@ VectorXd running_sum(const VectorXd& x) {
   return sum;
 }
 
+bool is_near(const std::vector<Interval>& motions, Index k, Index reach) {
+  return std::any_of(motions.begin(), motions.end(), [&](const Interval& i) { return k + reach > i.first && k - reach < i.last; });
+}
+
 /// By how much the mean over `m` samples behind sample k differs from that over as many before it.
 double change_of_means(const VectorXd& sum, Index m, Index k) { return std::abs(sum[k + m] - 2 * sum[k] + sum[k - m]) / static_cast<double>(m); }
 
 /// What is white in it.
 double white_change(double sigma, Index m) { return sigma * std::sqrt(2 / static_cast<double>(m)); }
 
-/// Whether the shaft moves all the time. Means of m samples change by m times the rate where the motion is smooth, and like the square root of m where a channel wanders (a random walk): from m / 4 to the shortest m
-/// at which the median change is clearly more than noise by four, or by two. The limit lies half-way, in the logarithm.
-bool moves_without_a_rest(const VectorXd& angle, double sigma, double quantum) {
-  constexpr Index shortest = 16, fewest = 40;  // samples in a mean; means
+/// Whether the shaft moves all the time, beside motions that are known. Means of m samples change by m times the rate where the motion is smooth, and like the square root of m where a channel
+/// wanders (a random walk): from m / 4 to the shortest m at which the median change is clearly more than noise by four, or by two. The limit lies half-way, in the logarithm.
+bool moves_without_a_rest(const VectorXd& angle, double sigma, double quantum, const std::vector<Interval>& known) {
+  constexpr Index shortest = 16;     // samples in a mean
+  constexpr std::size_t fewest = 40;  // means
   const double half_way = std::sqrt(2.0 * 4.0);
   const VectorXd sum = running_sum(angle);
-  const auto usual_change = [&](Index m) {
+  const auto changes = [&](Index m) {
     std::vector<double> change;
-    for (Index k = m; k + m <= angle.size(); k += m / 4) change.push_back(change_of_means(sum, m, k));
-    return median_to_sigma * median(change);
+    for (Index k = m; k + m <= angle.size(); k += m / 4)
+      if (!is_near(known, k, m)) change.push_back(change_of_means(sum, m, k));
+    return change;
   };
-  for (Index m = shortest; m * fewest <= angle.size(); m *= 2) {
-    const double change = usual_change(m);
-    if (change < std::max(chance * white_change(sigma, m), one_code * quantum)) continue;
-    const double white = white_change(sigma, m / 4), before = usual_change(m / 4);
-    return change * change > half_way * half_way * (before * before - white * white);
+  for (Index m = shortest;; m *= 2) {
+    std::vector<double> behind = changes(m), within = changes(m / 4);
+    if (behind.size() < 4 * fewest) return false;
+    const double change = median_to_sigma * median(behind), before = median_to_sigma * median(within), white = white_change(sigma, m / 4);
+    if (change > std::max(chance * white_change(sigma, m), one_code * quantum)) return change * change > half_way * half_way * (before * before - white * white);
   }
-  return false;
 }
 
 /// Slow motions far from those that are known: means over `m` samples that differ from those before by more than chance, and by more than what a channel that wanders does everywhere.
@@ -328,11 +333,10 @@ std::vector<Interval> moving_slowly(const VectorXd& angle, double sigma, double 
   constexpr std::size_t enough = 40;
   const Index n = angle.size();
   const VectorXd sum = running_sum(angle);
-  const auto near_known = [&](Index k) { return std::any_of(known.begin(), known.end(), [&](const Interval& i) { return k + m + beside > i.first && k - m - beside < i.last; }); };
   std::vector<Index> at;
   std::vector<double> change;
   for (Index k = m; k + m <= n; k += m / 4) {
-    if (near_known(k)) continue;
+    if (is_near(known, k, m + beside)) continue;
     at.push_back(k);
     change.push_back(change_of_means(sum, m, k));
   }
@@ -374,7 +378,7 @@ std::vector<Interval> moving(const VectorXd& angle, double sigma) {
   if (!smooth.allFinite()) return intervals;
   constexpr double hardly = 18;
   const double quantum = std::sqrt(12.0) * rounding_level(angle);
-  if (moves_without_a_rest(angle.array().isFinite().select(angle, smooth), sigma, quantum)) return {{0, n}};
+  if (moves_without_a_rest(angle.array().isFinite().select(angle, smooth), sigma, quantum, intervals)) return {{0, n}};
   widen(intervals, smooth, reach, hardly * sigma);
   for (const Index m : {16, 64, 256}) {
     const std::vector<Interval> slow = moving_slowly(smooth, sigma, quantum, m, intervals);
