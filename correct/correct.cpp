@@ -343,7 +343,7 @@ std::string knots_too_far_apart(const Run& run, const Windows& windows) {
   const Index stride = windows.front().stride;
   return fmt::format("{}: the fit names a nonlinear force, and the shaft moves for so long in all that the {} knots of its motion lie {} samples apart ({:.3g} ms). What it does faster is missing from the load, and the "
                      "band is too narrow while it moves. Correct the run in parts in which it moves for at most {} samples.",
-                     run.file, most_knots(windows.size()), stride, 1e3 * static_cast<double>(stride) * run.dt, most_moving(windows));
+                     run.file, most_knots_to_fit, stride, 1e3 * static_cast<double>(stride) * run.dt, most_moving(windows));
 }
 
 /// Whether every fitted channel has half of its readings there.
@@ -358,26 +358,30 @@ bool is_read(const Run& run, const std::vector<std::string>& channels, const Int
   return reads("alpha") && std::all_of(channels.begin(), channels.end(), reads);
 }
 
-/// The legs in which the run is followed; none where it is followed from sample to sample. Both are for linear rigs: a nonlinear force has to do with the knots there are, and is told so.
+/// The legs in which the run is followed; none where it is followed from sample to sample. Both are for linear rigs: beside a nonlinear force the motion has as many knots as a fit may have, and is told where these are
+/// too few.
 std::vector<Windows> legs_to_follow(const AeroelasticModel& model, const Run& run, const VectorXd& theta, const Windows& windows, std::vector<std::string>& warnings) {
-  if (!too_far_apart(windows)) return {windows};
+  if (windows.front().stride == 1) return {windows};
   const Conditions conditions = conditions_of(run);
   const std::vector<std::string> channels = model.output_channels(run);
   const LinearSystem system = model.system(conditions, theta, channels);
   if (system.feedback.empty()) {
+    if (!too_far_apart(windows)) return {windows};
     constexpr Index fewest = 100;          // samples of a rest: a quarter of them before the next motion, for its level
     constexpr double shortest_rest = 4;  // semichords
     const Index rest = std::max(fewest, static_cast<Index>(shortest_rest * model.rig().semichord() / run.speed / run.dt));
     const bool can_be_cut = system.exogenous.empty() && run_inputs(run, conditions).cols() == 0;
     return can_be_cut ? legs_of(windows, rest, [&](const Interval& samples) { return is_read(run, channels, samples); }) : std::vector<Windows>{};
   }
-  const Index most_at_all = farthest_at_all * most_knots(windows.size());
-  if (windows.front().stride > farthest_at_all && hardly_rests(run, windows))
+  const Windows closer = with_most_knots(windows);
+  if (!too_far_apart(closer)) return {closer};
+  constexpr Index most_at_all = farthest_at_all * most_knots_to_fit;
+  if (closer.front().stride > farthest_at_all && hardly_rests(run, closer))
     throw NoAnswer(fmt::format("{}: the shaft moves nearly all the time, for longer than {} samples, and the fit names a nonlinear force. Such a motion is followed by {} knots, which lie too far apart here: "
                                "correct the run in parts of at most {} samples that begin at rest",
-                               run.file, most_at_all, most_knots(windows.size()), most_at_all));
-  warnings.push_back(knots_too_far_apart(run, windows));
-  return {windows};
+                               run.file, most_at_all, most_knots_to_fit, most_at_all));
+  warnings.push_back(knots_too_far_apart(run, closer));
+  return {closer};
 }
 
 /// `numbers`: of a rig or run that states uncertainties, at whose numbers `problem` stands; null where nothing is stated.

@@ -22,7 +22,14 @@ Index farthest_knots(const Windows& windows) { return windows.size() > 1 ? 1 : 3
 
 bool too_far_apart(const Windows& windows) { return windows.front().stride > farthest_knots(windows); }
 
-Index most_moving(const Windows& windows) { return farthest_knots(windows) * most_knots(windows.size()); }
+Windows with_most_knots(Windows windows) {
+  Index total = 0;
+  for (const MotionBasis::Window& w : windows) total += w.knots.length();
+  for (MotionBasis::Window& w : windows) w.stride = 1 + total / (most_knots_to_fit + 1);
+  return windows;
+}
+
+Index most_moving(const Windows& windows) { return farthest_knots(windows) * most_knots_to_fit; }
 
 std::vector<Windows> legs_of(const Windows& windows, Index shortest_rest, const std::function<bool(const Interval& samples)>& read) {
   constexpr Index knots_in_leg = 150, level = 50;

@@ -18,7 +18,8 @@ Windows generous_windows(const Run& run);
 /// seventh is off by tens of standard deviations.
 Eigen::Index farthest_knots(const Windows& windows);
 bool too_far_apart(const Windows& windows);
-/// Samples in motion that so many windows can follow.
+/// The same windows with as many knots as a fit may have (most_knots_to_fit), and the samples in motion that they follow.
+Windows with_most_knots(Windows windows);
 Eigen::Index most_moving(const Windows& windows);
 
 /// The same windows by legs of a run (correct/segments/run_in_legs.h): of some hundred knots, or of the motions between which the shaft does not rest for `shortest_rest` samples, or where

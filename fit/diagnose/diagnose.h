@@ -45,7 +45,7 @@ struct DiagnoseProblem {
   std::vector<Run> runs;
   std::vector<Run> heldout;           ///< not fitted; predicted, with their own motion, initial state and lift slope
   Wagner circulation = Wagner::within_1e4;
-  bool verdict_only = false;          ///< neither maps nor predictions, nor descriptions of the fits, nor the missing force
+  bool verdict_only = false;          ///< neither maps nor predictions, nor the missing force, and of the fits that with what was found alone
   std::vector<std::string> effects;   ///< candidates; empty: all that can act in these runs
   bool laws = true;                   ///< where no effect explains the runs and no candidates are named, their law is looked for (fit/laws/law_search.h)
   double work = 0;                    ///< counted work after which the search ends with what it has found [1e9 multiplications, core/numerics/work.h]; 0: any

@@ -100,7 +100,8 @@ int diagnose_command(int argc, char** argv) {
   fmt::print("{}", report(diagnosis));
   for (const Run& run : all)
     if (run.hold) fmt::print("    {}: {}\n", base_name(run.file), said_of(*run.hold));
-  fmt::print("    {:.1f} s, {:.2g}e9 multiplications\n", diagnosis.seconds, diagnosis.work);
+  const std::string work = diagnosis.work < 10 ? fmt::format("{:.2g}", diagnosis.work) : fmt::format("{:.0f}", diagnosis.work);
+  fmt::print("    {:.1f} s, {}e9 multiplications\n", diagnosis.seconds, work);
   return diagnosis.unexplained ? exit_no_answer : exit_done;
 }
 

@@ -50,6 +50,8 @@ bool is_idle(const JointProblem& joint, const std::string& id) {
   return false;
 }
 
+Settle settled(const Trial& trial) { return trial.reduced_chi2() < twice_the_noise ? Settle::noise : Settle::nothing; }
+
 double probability_of(const std::string& id, const std::vector<Candidate>& ranking) {
   double sum = 0;
   for (const Candidate& c : ranking)
@@ -59,12 +61,15 @@ double probability_of(const std::string& id, const std::vector<Candidate>& ranki
 
 }  // namespace
 
+FitResult fit_with(const FoundSet& found, const SearchLimits& limits) {
+  FitProblem after = *found.setting.problem;
+  after.effects = found.best.effects;
+  return told(found.best.arrival, after, settled(found.best), limits);
+}
+
 void describe(const FitProblem& fit_problem, const Trial& baseline, const SearchLimits& limits, FoundSet& e, Diagnosis& d) {
   const Trial& best = e.best;
   const bool described = e.setting.problem != &fit_problem;
-  const auto settled = [](const Trial& trial) { return trial.reduced_chi2() < twice_the_noise ? Settle::noise : Settle::nothing; };
-  FitProblem after = *e.setting.problem;
-  after.effects = best.effects;
   Arrival before_arrival = baseline.arrival;
   if (d.mismatch.found) {
     PlainFit plain = plain_fit(fit_problem, baseline.arrival, d.unexplained && !has_colour(baseline.arrival.joint));  // first guesses know of none
@@ -72,7 +77,7 @@ void describe(const FitProblem& fit_problem, const Trial& baseline, const Search
     if (plain.baseline_was_lost) d.not_followed.insert(d.not_followed.begin(), std::vector<std::string>{});
   }
   d.before = told(before_arrival, fit_problem, d.mismatch.found ? Settle::nothing : Settle::noise, limits);  // a fit that explains nothing deserves no refinement
-  e.fit = best.effects.empty() && !described ? d.before : told(best.arrival, after, settled(best), limits);
+  e.fit = best.effects.empty() && !described ? d.before : fit_with(e, limits);
   d.after = e.fit;
   if (described && best.effects.empty()) d.after = d.before;
   if (described && !best.effects.empty()) {

@@ -8,6 +8,9 @@
 
 namespace unrig {
 
+/// The fit with what was found, in full.
+FitResult fit_with(const FoundSet& found, const SearchLimits& limits);
+
 /// Both fits in full, and what they leave of the fitted runs. Of an explanation with the rig's description put right `d.after` is the fit with its laws to the rig as the files have it: no fit is told that
 /// belongs to a rig in no file.
 void describe(const FitProblem& fit_problem, const Trial& baseline, const SearchLimits& limits, FoundSet& e, Diagnosis& d);

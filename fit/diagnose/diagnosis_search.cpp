@@ -312,6 +312,8 @@ Diagnosis DiagnosisSearch::told() {
     describe(fit_problem_, baseline_, limits_, found_, d);
     for (const ImprovedRun& run : found_.unseen) d.runs.push_back(run);
     if (d.unexplained) d.missing_force = missing_forces(found_.best.arrival.joint);
+  } else if (!found_.best.effects.empty()) {
+    found_.fit = fit_with(found_, limits_);
   }
   if (!d.not_followed.empty()) d.search = SearchOutcome::failed;
   tell_missing(d);

@@ -143,34 +143,66 @@ MatrixXd ChainEliminator::factor() const {
   return triangle;
 }
 
+ChainEliminator::Held ChainEliminator::held(const VectorXd& at, const std::vector<MatrixXd>& further, const MatrixXd& last) const {
+  std::vector<Link> links(steps_.size());
+  std::vector<MatrixXd> right(steps_.size());
+  const Index count = begin_.cols();
+  VectorXd state = begin_ * at.tail(count);
+  for (std::size_t p = 0; p < steps_.size(); ++p) {
+    const Step& step = steps_[p];
+    const Index reached = step.beyond.rows();
+    MatrixXd rows = MatrixXd::Zero(reached + further[p].rows(), step.own + step.state + shared_);
+    VectorXd there(rows.cols());
+    there << at.segment(step.first, step.own), state, at.tail(shared_);
+    if (step.own > 0) rows.topRows(reached) << step.eliminate->coordinates(), step.beyond;
+    rows.bottomRows(further[p].rows()) = further[p];
+    right[p] = MatrixXd::Zero(rows.rows(), 1);
+    right[p].topRows(reached) = rows.topRows(reached) * there;
+    if (step.transition.size() > 0) state = step.transition * there.head(step.own + step.state);
+    links[p] = {step.first, step.own, std::move(rows), step.transition};
+  }
+  MatrixXd last_rows(count + last.rows(), count), last_right = MatrixXd::Zero(last_rows.rows(), 1);
+  last_rows << last_->factor(), last;
+  last_right.topRows(count) = last_rows.topRows(count) * at.tail(count);
+  ChainEliminator chain(std::move(links), unknowns_, begin_, shared_, last_rows);
+  VectorXd unknowns = chain.solve(chain.rotated(std::move(right), last_right));
+  return {std::move(chain), std::move(unknowns)};
+}
+
 VectorXd ChainEliminator::damped_step(const VectorXd& full, double damping) const {
   VectorXd squares = VectorXd::Zero(unknowns_);
   for_each_row([&](const MatrixXd& rows) { squares += rows.colwise().squaredNorm().transpose(); });
   const VectorXd damped = (damping * squares).cwiseSqrt();
-  const Index last = begin_.cols();
-  std::vector<Link> links(steps_.size());
-  std::vector<MatrixXd> right(steps_.size());
-  VectorXd state = begin_ * full.tail(last);
-  for (std::size_t p = 0; p < steps_.size(); ++p) {
-    const Step& step = steps_[p];
-    const Index reached = step.beyond.rows();
-    MatrixXd rows = MatrixXd::Zero(reached + step.own, step.own + step.state + shared_);
-    VectorXd at(rows.cols());
-    at << full.segment(step.first, step.own), state, full.tail(shared_);
-    if (step.own > 0) {
-      rows.topRows(reached) << step.eliminate->coordinates(), step.beyond;
-      rows.bottomLeftCorner(step.own, step.own) = damped.segment(step.first, step.own).asDiagonal();
-    }
-    right[p] = MatrixXd::Zero(rows.rows(), 1);
-    right[p].topRows(reached) = rows.topRows(reached) * at;
-    if (step.transition.size() > 0) state = step.transition * at.head(step.own + step.state);
-    links[p] = {step.first, step.own, std::move(rows), step.transition};
+  std::vector<MatrixXd> further;
+  for (const Step& step : steps_) {
+    further.emplace_back(MatrixXd::Zero(step.own, step.own + step.state + shared_));
+    further.back().leftCols(step.own) = damped.segment(step.first, step.own).asDiagonal();
   }
-  MatrixXd last_rows(2 * last, last), last_right = MatrixXd::Zero(2 * last, 1);
-  last_rows << last_->factor(), MatrixXd(damped.tail(last).asDiagonal());
-  last_right.topRows(last) = last_rows.topRows(last) * full.tail(last);
-  const ChainEliminator chain(std::move(links), unknowns_, begin_, shared_, last_rows);
-  return chain.solve(chain.rotated(std::move(right), last_right));
+  return held(full, further, MatrixXd(damped.tail(begin_.cols()).asDiagonal())).unknowns;
+}
+
+std::vector<MatrixXd> ChainEliminator::covariance_roots() const {
+  const auto inverse = [](const Eliminator& eliminate) { return eliminate.solve(MatrixXd::Identity(eliminate.rank(), eliminate.rank())); };
+  std::vector<MatrixXd> roots;
+  const MatrixXd last = inverse(*last_);
+  MatrixXd root(begin_.rows() + shared_, last.cols());  // of [state | shared]
+  root << begin_ * last, last.bottomRows(shared_);
+  for (const Step& step : steps_) {
+    const Index fresh = step.own > 0 ? step.eliminate->rank() : 0;
+    MatrixXd joint = MatrixXd::Zero(step.own + root.rows(), root.cols() + fresh);  // of [own | state | shared]
+    joint.bottomLeftCorner(root.rows(), root.cols()) = root;
+    if (step.own > 0) {
+      joint.topLeftCorner(step.own, root.cols()) = -step.eliminate->solve(product(step.beyond, root));
+      joint.topRightCorner(step.own, fresh) = inverse(*step.eliminate);
+    }
+    roots.push_back(joint.topRows(step.own + step.state));
+    if (step.transition.size() == 0) continue;
+    MatrixXd next(step.transition.rows() + shared_, joint.cols());
+    next << product(step.transition, roots.back()), joint.bottomRows(shared_);
+    root = compress(next.transpose()).transpose();
+  }
+  roots.push_back(last);
+  return roots;
 }
 
 }  // namespace unrig::run_rows

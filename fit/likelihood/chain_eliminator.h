@@ -25,6 +25,9 @@ class ChainEliminator {
   /// `begin`: the first link's state over the last unknowns, which are the `begin.cols()` last ones of all; the last `shared` of them are those that links share. `last_rows`: over the last ones.
   ChainEliminator(std::vector<Link> links, Eigen::Index unknowns, Eigen::MatrixXd begin, Eigen::Index shared, const Eigen::MatrixXd& last_rows);
 
+  std::size_t links() const { return steps_.size(); }
+  bool has_state(std::size_t link) const { return steps_[link].state > 0; }
+
   /// Columns on the right hand side of the rows: what the unknowns reach of them, and what lies beside that.
   struct Rotated {
     std::vector<Eigen::MatrixXd> own;     ///< by link
@@ -39,10 +42,15 @@ class ChainEliminator {
   Eigen::MatrixXd factor() const;
   /// Its last rows: R of what is known of the last unknowns with all others eliminated.
   Eigen::MatrixXd last_factor() const { return last_->factor(); }
+  /// x with least |R (x - at)|^2 + |F x|^2, and R of both. `further`: rows F of each link, over [own | state | shared]; `last`: over the last unknowns.
+  struct Held;
+  Held held(const Eigen::VectorXd& at, const std::vector<Eigen::MatrixXd>& further, const Eigen::MatrixXd& last) const;
   /// Marquardt's (1963) step: s with least |R (s - full)|^2 + damping |D s|^2, D the lengths of R's columns.
   Eigen::VectorXd damped_step(const Eigen::VectorXd& full, double damping) const;
   /// Column j of (R^T R)^-1, of one of the last unknowns. Zero for one that the rows do not determine.
   Eigen::VectorXd covariance_column(Eigen::Index j) const;
+  /// Of each link L with L L^T = the covariance of [own | state]; behind them that of the last unknowns.
+  std::vector<Eigen::MatrixXd> covariance_roots() const;
 
  private:
   struct Step {
@@ -60,6 +68,11 @@ class ChainEliminator {
   Eigen::MatrixXd begin_;
   std::vector<Step> steps_;
   std::optional<Eliminator> last_;
+};
+
+struct ChainEliminator::Held {
+  ChainEliminator chain;
+  Eigen::VectorXd unknowns;
 };
 
 }  // namespace unrig::run_rows

@@ -1,6 +1,5 @@
 #include "fit/likelihood/motion_prior.h"
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 #include <vector>
@@ -121,13 +120,29 @@ MatrixXd motion_prior(const RunResidual& residual, const VectorXd& theta) {
     }
   }
 
-  const MatrixXd triangle = residual.linear_rows(theta);  // [R | q]
-  if (triangle.size() == 0) return {};
-  const MatrixXd R = triangle.topLeftCorner(unknowns, unknowns);
-  const MatrixXd information = R.transpose() * R;
-  const VectorXd right = R.transpose() * triangle.col(unknowns).head(unknowns);
-  const VectorXd scale = information.diagonal().cwiseSqrt().cwiseMax(1e-300).cwiseInverse();
+  RunResidual free = residual;
+  free.set_motion_prior({});
+  const RunResidual::Solution solution = free.solve(theta);
+  if (!std::isfinite(solution.chi2)) return {};
+  Index count = 0;
+  for (const Group& group : groups) count += group.rows.rows();
+  MatrixXd all = MatrixXd::Zero(count, unknowns);
+  count = 0;
+  for (const Group& group : groups) {
+    all.block(count, group.first, group.rows.rows(), group.rows.cols()) = group.rows;
+    count += group.rows.rows();
+  }
+  const RunResidual::MotionRows rows = free.by_piece(std::move(all));
 
+  const auto scales = [&](const std::vector<double>& by_group) {
+    VectorXd scale(rows.all.rows());
+    Index row = 0;
+    for (std::size_t g = 0; g < groups.size(); ++g) {
+      scale.segment(row, groups[g].rows.rows()).setConstant(std::sqrt(by_group[g]));
+      row += groups[g].rows.rows();
+    }
+    return scale;
+  };
   // Scales from very wide downwards; each round is one pass of MacKay's fixed point.
   std::vector<double> precision(groups.size());
   const double wide = 1e3 * residual.angle_sigma();
@@ -135,20 +150,14 @@ MatrixXd motion_prior(const RunResidual& residual, const VectorXd& theta) {
   constexpr int rounds = 40;
   std::vector<Roughness> found(groups.size());
   for (int round = 0; round < rounds; ++round) {
-    MatrixXd posterior = information;
-    for (std::size_t g = 0; g < groups.size(); ++g) {
-      const Index width = groups[g].rows.cols();
-      posterior.block(groups[g].first, groups[g].first, width, width).noalias() += precision[g] * groups[g].rows.transpose() * groups[g].rows;
-    }
-    const Eigen::LLT<MatrixXd> llt(scale.asDiagonal() * posterior * scale.asDiagonal());
-    const VectorXd c = scale.cwiseProduct(llt.solve(scale.cwiseProduct(right)));
-    const MatrixXd root = llt.matrixL().solve(MatrixXd(scale.asDiagonal()));  // root^T root = posterior^-1
+    const RunResidual::HeldMotion held = free.hold_motion(solution, rows, scales(precision));
     double change = 0;
+    Index row = 0;
     for (std::size_t g = 0; g < groups.size(); ++g) {
-      const auto& [rows, first, window, stride] = groups[g];
-      const double left_open = (root.middleCols(first, rows.cols()) * rows.transpose()).squaredNorm();
-      found[g].determined = std::max(1e-3, static_cast<double>(rows.rows()) - precision[g] * left_open);
-      found[g].squares = (rows * c.segment(first, rows.cols())).squaredNorm();
+      const Group& group = groups[g];
+      found[g].determined = std::max(1e-3, static_cast<double>(group.rows.rows()) - held.variance.segment(row, group.rows.rows()).sum());
+      found[g].squares = (group.rows * held.linear.segment(group.first, group.rows.cols())).squaredNorm();
+      row += group.rows.rows();
     }
     // A group of smooth motion would let its scale run to zero; a thousandth of the angle's noise is smooth enough.
     const std::vector<double> next = most_probable(groups, found, precision, 1e-6 * residual.angle_sigma() * residual.angle_sigma());
@@ -159,18 +168,7 @@ MatrixXd motion_prior(const RunResidual& residual, const VectorXd& theta) {
 
   precision = as_wide_as_neighbours(precision, groups);
 
-  Index count = 0;
-  for (Group& group : groups) {
-    group.rows = run_rows::compress(std::move(group.rows));
-    count += group.rows.rows();
-  }
-  MatrixXd prior = MatrixXd::Zero(count, unknowns);
-  Index row = 0;
-  for (std::size_t g = 0; g < groups.size(); ++g) {
-    prior.block(row, groups[g].first, groups[g].rows.rows(), groups[g].rows.cols()) = std::sqrt(precision[g]) * groups[g].rows;
-    row += groups[g].rows.rows();
-  }
-  return prior;
+  return scales(precision).asDiagonal() * rows.all;
 }
 
 }  // namespace unrig

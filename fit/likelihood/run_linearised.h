@@ -111,7 +111,7 @@ struct RunResidual::Linearised {
   Eigen::MatrixXd end;                  // as their starts, behind the last sample
   bool linked = false;                  // whether each piece is a link of the elimination; else all rows are over c as a whole
 
-  /// Rows of all pieces on their way into the elimination: as its links or, where a prior on the motion holds many knots together, over all of c at once.
+  /// Rows of all pieces on their way into the elimination: as its links or, where a row of a prior on the motion reaches farther, over all of c at once.
   struct Rows {
     Rows(const RunResidual& run, bool linked);
     /// The state that a run begins in, from d state / d c there, which is not zero.

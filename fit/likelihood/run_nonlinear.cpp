@@ -91,7 +91,7 @@ bool RunResidual::stack_nonlinear_rows(Linearised& lin, const VectorXd& theta, c
   for (std::size_t i = 0; i < free_.size(); ++i) start(free_[i], first_state_ + static_cast<Index>(i)) = 1;
   lin.blocks.clear();
   lin.linked = false;
-  Linearised::Rows rows(*this, motion_prior_.rows() == 0);
+  Linearised::Rows rows(*this, is_linked());
   bool moved = has_state(pieces_.front(), start);
   if (moved) rows.begin(start);
   double unreachable = 0;

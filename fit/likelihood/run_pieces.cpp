@@ -17,11 +17,16 @@ using Eigen::VectorXd;
 
 using run_rows::stacked;
 
+Index RunResidual::longest_stride() const {
+  Index stride = 1;
+  for (const MotionBasis::Window& window : motion_.windows()) stride = std::max(stride, window.stride);
+  return stride;
+}
+
 /// Long motions in pieces of so many knots, which the elimination takes one by one.
 void RunResidual::cut_phases() {
   constexpr Index knots = 32;
-  Index stride = 1;
-  for (const MotionBasis::Window& window : motion_.windows()) stride = std::max(stride, window.stride);
+  const Index stride = longest_stride();
   pieces_.clear();
   for (const MotionBasis::Phase& phase : phases_) {
     const Index length = phase.samples.length(), count = phase.moving ? std::max<Index>(1, length / (knots * stride)) : 1, each = (length + count - 1) / count;
@@ -32,10 +37,12 @@ void RunResidual::cut_phases() {
   }
 }
 
-/// The first spline that does not stand still before a sample.
+/// The first spline that does not stand still before a sample: while the shaft moves neither those that fourth differences of the coefficients (fit/likelihood/motion_prior.h) hold together with what begins there.
 Index RunResidual::first_open(Index at) const {
   const std::vector<MotionBasis::Column>& columns = motion_.columns();
-  const auto still = [&](const MotionBasis::Column& column) { return column.first + column.value.size() + 3 <= at; };
+  const bool moves = std::any_of(phases_.begin(), phases_.end(), [&](const MotionBasis::Phase& phase) { return phase.moving && phase.samples.first < at && at < phase.samples.last; });
+  const Index reach = moves ? 4 * longest_stride() : 3;
+  const auto still = [&](const MotionBasis::Column& column) { return column.first + column.value.size() + reach <= at; };
   return std::find_if_not(columns.begin(), columns.end(), still) - columns.begin();
 }
 
@@ -74,6 +81,54 @@ RowVectorXd RunResidual::level_before(Index spline) const {
   RowVectorXd level(spline);
   for (Index j = 0; j < spline; ++j) level[j] = motion_.columns()[static_cast<std::size_t>(j)].tail;
   return level;
+}
+
+RunResidual::MotionRows RunResidual::by_piece(MatrixXd rows) const {
+  MotionRows parted{{}, std::vector<std::vector<Index>>(pieces_.size()), std::move(rows)};
+  for (Index row = 0; row < parted.all.rows(); ++row) {
+    if (parted.all.row(row).isZero(0)) continue;
+    Index first = 0, last = parted.all.cols() - 1;
+    while (first < last && parted.all(row, first) == 0) ++first;
+    while (first < last && parted.all(row, last) == 0) --last;
+    const auto piece = std::find_if(pieces_.begin(), pieces_.end(), [&](const Piece& p) { return p.moving && p.splines.still <= first && p.splines.begin <= last && last < p.splines.end; });
+    if (piece == pieces_.end()) return parted;
+    parted.number[static_cast<std::size_t>(piece - pieces_.begin())].push_back(row);
+  }
+  for (std::size_t p = 0; p < pieces_.size(); ++p) {
+    const Splines& splines = pieces_[p].splines;
+    parted.rows.emplace_back(static_cast<Index>(parted.number[p].size()), splines.all());
+    for (std::size_t i = 0; i < parted.number[p].size(); ++i) parted.rows.back().row(static_cast<Index>(i)) = parted.all.row(parted.number[p][i]).segment(splines.still, splines.all());
+  }
+  return parted;
+}
+
+/// Link by link; where c was eliminated as a whole, all at once.
+RunResidual::HeldMotion RunResidual::hold_motion(const Solution& solution, const MotionRows& rows, const VectorXd& scale) const {
+  const Linearised& lin = *solution.model;
+  HeldMotion result{{}, VectorXd::Zero(rows.all.rows())};
+  if (!lin.linked || rows.rows.empty()) {
+    MatrixXd all = MatrixXd::Zero(rows.all.rows(), unknowns_);
+    all.leftCols(rows.all.cols()) = scale.asDiagonal() * rows.all;
+    const run_rows::ChainEliminator whole({}, unknowns_, MatrixXd(0, unknowns_), unknowns_, lin.eliminate->factor());
+    auto [chain, linear] = whole.held(solution.linear, {}, all);
+    result.linear = std::move(linear);
+    result.variance = product(all, chain.covariance_roots().back()).rowwise().squaredNorm();
+    return result;
+  }
+  const std::size_t count = lin.eliminate->links();
+  std::vector<MatrixXd> further;
+  for (std::size_t p = 0; p < count; ++p) {
+    const MatrixXd own = scale(rows.number[p]).asDiagonal() * rows.rows[p];
+    further.push_back(link_rows(pieces_[p], lin.eliminate->has_state(p), own, {}, MatrixXd(own.rows(), 0), first_offset_));
+  }
+  auto [chain, linear] = lin.eliminate->held(solution.linear, further, MatrixXd(0, unknowns_ - first_state_));
+  result.linear = std::move(linear);
+  const std::vector<MatrixXd> roots = chain.covariance_roots();
+  for (std::size_t p = 0; p < count; ++p) {
+    const VectorXd variance = product(further[p].leftCols(roots[p].rows()), roots[p]).rowwise().squaredNorm();
+    for (std::size_t i = 0; i < rows.number[p].size(); ++i) result.variance[rows.number[p][i]] = variance[static_cast<Index>(i)];
+  }
+  return result;
 }
 
 /// [c | reading] of what is known of c beside the channels: the prior on the motion, and the noise's own state.
@@ -207,7 +262,7 @@ MatrixXd RunResidual::over_c(const Piece& piece, bool has_state, const MatrixXd&
 /// Pieces up to the last that says anything.
 std::size_t RunResidual::counted_pieces() const {
   std::size_t count = pieces_.size();
-  while (count > 0 && counted(pieces_[count - 1].samples).length() <= 0 && (angle_rows_.empty() || angle_rows_[count - 1].isZero(0))) --count;
+  while (count > 0 && counted(pieces_[count - 1].samples).length() <= 0 && (angle_rows_.empty() || angle_rows_[count - 1].isZero(0)) && (prior_rows_.empty() || prior_rows_[count - 1].rows() == 0)) --count;
   return count;
 }
 
@@ -238,6 +293,11 @@ void RunResidual::Linearised::Rows::end_piece(bool has_state, MatrixXd transitio
       own_.push_back(run_.link_rows(piece, has_state, angle.leftCols(acting + 1), {}, angle.middleCols(acting + 1, 1), run_.angle_offset_));
       own_right_.push_back(angle.rightCols(1));
     }
+    if (!run_.prior_rows_.empty()) {
+      const MatrixXd& prior = run_.prior_rows_[at_];
+      own_.push_back(run_.link_rows(piece, has_state, prior, {}, MatrixXd(prior.rows(), 0), run_.first_offset_));
+      own_right_.push_back(MatrixXd::Zero(prior.rows(), 1));
+    }
     links_[at_] = {piece.splines.begin, piece.splines.own(), stacked(own_, own_.front().cols()), std::move(transition)};
     right_[at_] = stacked(own_right_, 1);
   }
@@ -253,7 +313,7 @@ void RunResidual::Linearised::Rows::settle(Linearised& lin, double unreachable) 
     lin.settle(whole_, run_.unknowns_, unreachable);
     return;
   }
-  const MatrixXd held = run_.held_rows();
+  const MatrixXd held = run_.colour_rows();
   auto chain = std::make_unique<run_rows::ChainEliminator>(std::move(links_), run_.unknowns_, begin_, run_.unknowns_ - run_.first_offset_, held.middleCols(run_.first_state_, begin_.cols()));
   const run_rows::ChainEliminator::Rotated right = chain->rotated(std::move(right_), held.rightCols(1));
   lin.settle(std::move(chain), right, unreachable);

@@ -141,15 +141,4 @@ MatrixXd RunResidual::linear_factor(const Solution& solution) const {
   return std::isfinite(solution.chi2) ? solution.model->eliminate->factor() : MatrixXd::Zero(unknowns_, unknowns_);
 }
 
-MatrixXd RunResidual::linear_rows(const VectorXd& theta) const {
-  RunResidual free = *this;
-  free.set_motion_prior({});
-  const Solution solution = free.solve(theta);
-  if (!std::isfinite(solution.chi2)) return {};
-  MatrixXd rows(unknowns_, unknowns_ + 1);
-  const MatrixXd factor = free.linear_factor(solution);
-  rows << factor, factor * solution.linear;
-  return rows;
-}
-
 }  // namespace unrig

@@ -80,7 +80,7 @@ std::vector<Interval> moving_softly(const VectorXd& angle, double sigma) {
 
 }  // namespace
 
-// Steps need a knot on every sample: 560 of them, four steps in a record, are corrected in 3 s. With a prior on the motion the cost goes with the cube: what goes on and on has to do with fewer.
+// Steps need a knot on every sample: 560 of them, four steps in a record, are corrected in 3 s. What the bands take goes with the cube: what goes on and on has to do with fewer.
 Eigen::Index most_knots(std::size_t windows) { return windows > 1 ? 600 : 400; }
 
 namespace {
@@ -244,6 +244,7 @@ void RunResidual::lay_out() {
   unknowns_ = first_offset_ + static_cast<Index>(channels_.size());
   if (conditions_.prescribed_pitch) angle_offset_ = unknowns_++;
   motion_prior_.resize(0, 0);
+  prior_rows_.clear();
   weights_changed();
 }
 
@@ -272,6 +273,9 @@ void RunResidual::share_responses_with(RunResidual& other) {
 void RunResidual::set_motion_prior(const MatrixXd& rows) {
   motion_prior_ = MatrixXd::Zero(rows.rows(), unknowns_ + 1);
   if (rows.rows() > 0) motion_prior_.leftCols(unknowns_) = rows;
+  prior_rows_ = by_piece(rows).rows;
+  for (MatrixXd& own : prior_rows_)
+    if (own.rows() > own.cols()) own = run_rows::compress(std::move(own));
   forget_solutions();
 }
 

@@ -39,8 +39,8 @@ struct RunOptions {
 /// ((y_measured - y(theta, c)) / sigma)^2 is least over c for every theta (variable projection, Golub and Pereyra 1973), so that a nonlinear solver
 /// sees only theta.
 ///
-/// c is eliminated piece by piece, in time that goes with the record (fit/likelihood/chain_eliminator.h): a piece is a rest, or the samples of some 32 knots. A prior on the motion
-/// (set_motion_prior) holds knots far apart together: all of c is eliminated at once then, and the cost goes with the cube of the knots.
+/// c is eliminated piece by piece, in time that goes with the record (fit/likelihood/chain_eliminator.h): a piece is a rest, or the samples of some 32 knots. The rows of a prior on
+/// the motion (set_motion_prior) belong to pieces too; where one holds knots together that are farther apart, all of c is eliminated at once, and the cost goes with the cube of the knots.
 ///
 /// With nonlinear effects at work the linear unknowns enter nonlinearly too, and c is searched for at every theta by Levenberg-Marquardt steps along exact
 /// tangents (core/propagate/nonlinear_response.h): n x n x (n + knots of a piece) a sample and step.
@@ -137,8 +137,18 @@ class RunResidual {
 
   /// R, upper triangular, with R^T R the information matrix of c at fixed theta; zero where the model runs away. Its cost goes with the cube of the unknowns.
   Eigen::MatrixXd linear_factor(const Solution& solution) const;
-  /// The linear unknowns' least-squares problem at theta, triangularised: [R | q], R c = q, without any prior on the motion. Empty where the model runs away.
-  Eigen::MatrixXd linear_rows(const Eigen::VectorXd& theta) const;
+  /// Rows over the motion's unknowns by the piece in which the last of them begins, over the splines that act there.
+  struct MotionRows {
+    std::vector<Eigen::MatrixXd> rows;  ///< none where one reaches farther back than these
+    std::vector<std::vector<Eigen::Index>> number;  ///< of each of them among all
+    Eigen::MatrixXd all;
+  };
+  MotionRows by_piece(Eigen::MatrixXd rows) const;
+  /// c with least chi-square beside further rows of the motion, held against zero, to first order about a solution without a prior; and the variance of what c makes of each row. `scale`: of each row.
+  struct HeldMotion {
+    Eigen::VectorXd linear, variance;
+  };
+  HeldMotion hold_motion(const Solution& solution, const MotionRows& rows, const Eigen::VectorXd& scale) const;
   /// Rows over c that are held against zero beside the data (motion_prior); they count in chi-square. Empty: none.
   void set_motion_prior(const Eigen::MatrixXd& rows);
 
@@ -310,6 +320,7 @@ class RunResidual {
   LinearSystem searched_system(const Eigen::VectorXd& theta) const;
   LinearSystem differentiable_system(const Eigen::VectorXd& theta, const std::vector<Eigen::Index>& parameters) const;
   void cut_phases();
+  Eigen::Index longest_stride() const;
   Splines splines_in(const Interval& samples) const;
   Eigen::Index first_open(Eigen::Index at) const;
   Eigen::VectorXd motion_state(const Linearised& lin, Eigen::Index spline, Eigen::Index at) const;
@@ -330,6 +341,7 @@ class RunResidual {
   Eigen::MatrixXd motion_output_columns(const Linearised& lin, Eigen::Index channel, const Interval& samples, const Splines& splines) const;
   Eigen::MatrixXd angle_rows() const;
   Eigen::VectorXd angle_residual(std::size_t piece, const Eigen::VectorXd& linear) const;
+  bool is_linked() const { return motion_prior_.rows() == 0 || !prior_rows_.empty(); }
   Eigen::MatrixXd held_rows() const;
   Eigen::VectorXd held_residual(const Eigen::VectorXd& linear) const;
   Eigen::VectorXd initial_state(const Eigen::VectorXd& linear, Eigen::Index states) const;
@@ -358,6 +370,7 @@ class RunResidual {
   std::shared_ptr<SharedResponses> shared_;
   DualMatrix arrival_;            ///< empty where the run begins of its own
   Eigen::MatrixXd motion_prior_;  ///< [c | 0]
+  std::vector<Eigen::MatrixXd> prior_rows_;  ///< the same by piece, over the splines that act in it; none where a row reaches farther
   std::vector<Eigen::MatrixXd> angle_rows_;  ///< by piece, weighted, [splines that act in it | level of the earlier ones | angle before the motion | angle]; they do not depend on theta
   std::vector<Eigen::Index> differentiated_;
   Eigen::MatrixXd inputs_;  ///< samples + 1 rows

@@ -83,7 +83,7 @@ void RunResidual::prepare_linear(Linearised& lin) const {
   lin.polynomials = inputs_.cols() == 0 && !lin.wandering;
   if (motion_.unknowns() > 0) {
     Index support = 0;
-    for (const MotionBasis::Column& column : motion_.columns()) support = std::max<Index>(support, column.value.size() + 3);
+    for (const MotionBasis::Column& column : motion_.columns()) support = std::max<Index>(support, column.value.size() + 4 * longest_stride());
     lin.spline = spline_states(lin.step, longest_piece(true) + support + 1);
     lin.spline_summed = lin.spline;
     for (Index k = 1; k < lin.spline.cols(); ++k) lin.spline_summed.col(k) += lin.spline_summed.col(k - 1);
@@ -194,7 +194,7 @@ void RunResidual::stack_rows(Linearised& lin) const {
     return;
   }
   if (arrival_.cols() > 0) start.rightCols(1) = arrival_.value;
-  Linearised::Rows rows(*this, motion_prior_.rows() == 0);
+  Linearised::Rows rows(*this, is_linked());
   bool moved = has_state(pieces_.front(), start);
   if (moved) rows.begin(start);
   double unreachable = 0;
@@ -370,8 +370,8 @@ RunResidual::Evaluation says_nothing(Index parameters, Index unknowns) {
   return e;
 }
 
-/// Rows [slopes | left] that hold what c leaves of the angle, which no theta moves.
-MatrixXd of_angle(const VectorXd& left, Index columns) {
+/// Rows [slopes | left] that hold what c leaves of what no theta moves.
+MatrixXd of_constant(const VectorXd& left, Index columns) {
   MatrixXd rows = MatrixXd::Zero(left.size(), columns);
   rows.rightCols(1) = left;
   return rows;
@@ -379,23 +379,25 @@ MatrixXd of_angle(const VectorXd& left, Index columns) {
 
 }  // namespace
 
-/// What the channels' blocks reach and what c leaves of the angle, on their way through the links.
+/// What the channels' blocks reach and what c leaves of angle and prior, on their way through the links.
 run_rows::ChainEliminator::Rotated RunResidual::Linearised::rotated_links(const RunResidual& run, const std::vector<MatrixXd>& reached, Index columns) const {
   const std::size_t count = run.counted_pieces(), channels = static_cast<std::size_t>(run.measured_.cols());
   std::vector<MatrixXd> right(count);
   for (std::size_t p = 0, b = 0; p < count; ++p) {
     std::vector<MatrixXd> of_link;
     for (std::size_t c = 0; c < channels && b < reached.size(); ++c) of_link.push_back(reached[b++]);
-    if (!run.angle_rows_.empty()) of_link.push_back(of_angle(run.angle_residual(p, linear), columns));
+    if (!run.angle_rows_.empty()) of_link.push_back(of_constant(run.angle_residual(p, linear), columns));
+    if (!run.prior_rows_.empty()) of_link.push_back(of_constant(-run.prior_rows_[p] * linear.segment(run.pieces_[p].splines.still, run.pieces_[p].splines.all()), columns));
     right[p] = stacked(of_link, columns);
   }
-  return eliminate->rotated(std::move(right), of_angle(run.held_residual(linear), columns));
+  const MatrixXd colour = run.colour_rows();
+  return eliminate->rotated(std::move(right), of_constant(colour.col(run.unknowns_) - colour.leftCols(run.unknowns_) * linear, columns));
 }
 
 /// The same where the rows are over all of c.
 run_rows::ChainEliminator::Rotated RunResidual::Linearised::rotated_whole(const RunResidual& run, std::vector<MatrixXd> reached, Index columns) const {
   const MatrixXd angle = run.angle_rows();
-  reached.push_back(of_angle(angle.col(run.unknowns_) - angle.leftCols(run.unknowns_) * linear, columns));
+  reached.push_back(of_constant(angle.col(run.unknowns_) - angle.leftCols(run.unknowns_) * linear, columns));
   return eliminate->rotated({}, stacked(reached, columns));
 }
 

@@ -1,6 +1,5 @@
 #include "fit/search/find_motion.h"
 
-#include <algorithm>
 #include <utility>
 
 #include "fit/likelihood/motion_prior.h"
@@ -13,10 +12,7 @@ using Eigen::VectorXd;
 void lead_in(RunResidual& run, const VectorXd& theta, const std::function<void()>& search) {
   constexpr double unheard = 1e6;  // what the gauge read has no say
   run.temper(unheard);
-  const auto is_sparse = [](const MotionBasis::Window& window) { return window.stride > 1; };
-  const std::vector<MotionBasis::Window>& windows = run.motion().windows();
-  const bool determined = std::all_of(windows.begin(), windows.end(), is_sparse);  // knots that lie as far apart as the angle lets them
-  const MatrixXd prior = determined ? MatrixXd() : motion_prior(run, theta);
+  const MatrixXd prior = motion_prior(run, theta);
   run.set_motion_prior(prior);
   run.solve(theta);
   for (const double noise : {100.0, 30.0, 10.0, 3.0, 1.0}) {
@@ -24,7 +20,6 @@ void lead_in(RunResidual& run, const VectorXd& theta, const std::function<void()
     search();
   }
   for (const double held : {0.3, 0.1, 0.03, 0.0}) {
-    if (prior.size() == 0) return;
     run.set_motion_prior(held > 0 ? MatrixXd(held * prior) : MatrixXd());
     search();
   }

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <numbers>
 #include <random>
+#include <utility>
 
 #include "core/model/simulate.h"
 #include "tests/correct/null_campaign.h"
@@ -18,10 +19,10 @@ struct Recorded {
 };
 
 /// A run of the null campaign's rig with the noise of its channels, of this angle [deg] over time [s] beside 2 degrees: simulated at a quarter of the sampling interval, with Wagner's function.
-inline Recorded record(double (*angle)(double), Eigen::Index samples, unsigned seed = 11) {
+inline Recorded record(double (*angle)(double), Eigen::Index samples, unsigned seed = 11, const FittedRig& fit = null_fit()) {
   constexpr double gauge_noise = 0.027, angle_noise = 0.01 * std::numbers::pi / 180;
   constexpr Eigen::Index finer = 4;
-  const AeroelasticModel model(null_rig(), make_basis(null_rig(), null_fit().normal_modes, null_fit().torsion_modes), wagner(Wagner::within_1e6));
+  const AeroelasticModel model = AeroelasticModel(null_rig(), make_basis(null_rig(), fit.normal_modes, fit.torsion_modes), wagner(Wagner::within_1e6)).with_effects(fit.effects);
   Run motion;
   motion.file = "recorded.csv";
   motion.density = 998.2;
@@ -30,7 +31,7 @@ inline Recorded record(double (*angle)(double), Eigen::Index samples, unsigned s
   Eigen::VectorXd fine(finer * samples);
   for (Eigen::Index k = 0; k < fine.size(); ++k) fine[k] = (2 + angle(motion.time(k))) * std::numbers::pi / 180;
   motion.channels.push_back({"alpha", "rad", "rad", 1, fine, 0});
-  Eigen::VectorXd theta = theta_for(model, null_fit(), "");
+  Eigen::VectorXd theta = theta_for(model, fit, "");
   theta[model.index("normal_force_slope")] = recorded_slope;
   const SimulateResult truth = simulate({model, theta, motion, PitchBetweenSamples::spline, std::nullopt, 0.2});
   const auto sampled = [&](const std::string& channel) -> Eigen::VectorXd {
@@ -61,14 +62,14 @@ inline AeroelasticModel free_circulation() {
   return {null_rig(), make_basis(null_rig(), null_fit().normal_modes, null_fit().torsion_modes), {"free", Eigen::VectorXd{{0.02, 0.1, 0.15, 0.2, 0.03}}, rates}, AeroelasticModel::Circulation::free};
 }
 
-/// The null campaign's fit as if it had found dry friction too.
-inline FittedRig with_friction() {
+/// The null campaign's fit as if it had found dry friction too: force [N] and velocity [m/s].
+inline FittedRig with_friction(double force = 0.1, double velocity = 0.1) {
   FittedRig fit = null_fit();
   fit.effects = {"coulomb-friction"};
-  for (const char* name : {"coulomb-friction.force", "coulomb-friction.velocity"}) {
+  for (const auto& [name, value] : {std::pair{"coulomb-friction.force", force}, {"coulomb-friction.velocity", velocity}}) {
     fit.parameters.emplace_back();
     fit.parameters.back().name = name;
-    fit.parameters.back().value = 0.1;
+    fit.parameters.back().value = value;
   }
   fit.correlation = Eigen::MatrixXd::Identity(static_cast<Eigen::Index>(fit.parameters.size()), static_cast<Eigen::Index>(fit.parameters.size()));
   return fit;

@@ -112,6 +112,41 @@ TEST(ChainEliminator, DampedStepIsThatOfTheWholeFactor) {
   }
 }
 
+/// Further rows of each link and of the last unknowns, and what is known of an unknown and of states then.
+TEST(ChainEliminator, HeldByFurtherRowsIsWhatAllRowsSay) {
+  for (const Problem& p : problems()) {
+    const ChainEliminator chain = p.chain();
+    const VectorXd at = test::random_matrix(p.unknowns, 1, 9);
+    std::vector<MatrixXd> further, over_all{p.columns};
+    MatrixXd state = MatrixXd::Zero(3, p.unknowns);
+    state.rightCols(4) = p.begin;
+    std::vector<MatrixXd> ends;  // [own | state] over all
+    for (std::size_t k = 0; k < p.links.size(); ++k) {
+      const Link& link = p.links[k];
+      further.push_back(test::random_matrix(2, link.own + 5, static_cast<unsigned>(40 + k)));
+      MatrixXd end = MatrixXd::Zero(link.own + 3, p.unknowns);
+      end.topRows(link.own).middleCols(link.first, link.own).setIdentity();
+      end.bottomRows(3) = state;
+      over_all.push_back(further.back().leftCols(link.own + 3) * end);
+      over_all.back().rightCols(2) += further.back().rightCols(2);
+      if (link.transition.size() > 0) state = link.transition * end;
+      ends.push_back(std::move(end));
+    }
+    const MatrixXd last = test::random_matrix(1, 4, 7);
+    MatrixXd of_last = MatrixXd::Zero(1, p.unknowns);
+    of_last.rightCols(4) = last;
+    over_all.push_back(of_last);
+    const MatrixXd rows = stacked(over_all, p.unknowns), information = rows.transpose() * rows;
+    const auto [of_both, unknowns] = chain.held(at, further, last);
+    EXPECT_TRUE(unknowns.isApprox(information.ldlt().solve(p.columns.transpose() * p.columns * at), 1e-8));
+    const MatrixXd covariance = information.inverse();
+    const std::vector<MatrixXd> roots = of_both.covariance_roots();
+    ASSERT_EQ(roots.size(), ends.size() + 1);
+    for (std::size_t k = 0; k < ends.size(); ++k) EXPECT_TRUE((roots[k] * roots[k].transpose()).isApprox(ends[k] * covariance * ends[k].transpose(), 1e-8)) << k;
+    EXPECT_TRUE((roots.back() * roots.back().transpose()).isApprox(covariance.bottomRightCorner(4, 4), 1e-8));
+  }
+}
+
 /// Two unknowns of which only the sum enters, and one that nothing sees.
 TEST(ChainEliminator, LeavesAtZeroWhatNothingDetermines) {
   const Problem p = random_problem({4, 6, 5}, {12, 16, 30}, 0, [](std::size_t k, Link& link) {

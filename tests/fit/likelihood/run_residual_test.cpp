@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "core/files/error.h"
+#include "fit/likelihood/motion_prior.h"
 #include "tests/fit/run_cases.h"
 #include "tests/support/slope.h"
 
@@ -83,13 +84,18 @@ TEST(RunResidual, HorizonCountsFromTheOnset) {
   EXPECT_LT(turned.residual({50}).evaluate(turned.theta, Partials::none).chi2, turned.residual().evaluate(turned.theta, Partials::none).chi2);
 }
 
-/// Piece by piece, as without a prior, or all unknowns at once, as with one that says nothing; a record that breaks off in the motion leaves the knots behind it open.
+/// Piece by piece, with a prior on the motion and without, or all unknowns at once, as where a row of it that says nothing holds the first and the last knot together; a record that breaks off in the motion leaves the knots behind it open.
 TEST(RunResidual, PiecesOfAMotionMakeTheWhole) {
   for (const Case& c : {restless(1), restless(3), damaged(restless(2)), step(1)})
-    for (const Index horizon : {0, 70, 130}) {
-      const RunResidual pieces = c.residual({horizon});
+    for (const auto& [horizon, with_prior] : {std::pair<Index, bool>{0, false}, {70, false}, {130, false}, {0, true}, {130, true}}) {
+      RunResidual pieces = c.residual({horizon});
+      const MatrixXd prior = with_prior ? motion_prior(c.residual(), c.theta) : MatrixXd(0, pieces.linear_unknowns());
+      MatrixXd far = MatrixXd::Zero(prior.rows() + 1, prior.cols());
+      far.topRows(prior.rows()) = prior;
+      far(prior.rows(), 0) = far(prior.rows(), pieces.motion().unknowns() - 1) = 1e-12;
       RunResidual whole = pieces;
-      whole.set_motion_prior(1e-12 * MatrixXd::Identity(whole.linear_unknowns(), whole.linear_unknowns()).topRows(1));
+      pieces.set_motion_prior(prior);
+      whole.set_motion_prior(far);
       const RunResidual::Evaluation a = pieces.evaluate(c.theta, Partials::all), b = whole.evaluate(c.theta, Partials::all);
       const MatrixXd factor = pieces.linear_factor(pieces.solve(c.theta)), its = whole.linear_factor(whole.solve(c.theta));
       EXPECT_NEAR(a.chi2 / b.chi2, 1, 1e-9) << c.name << ", " << horizon;
