@@ -124,6 +124,8 @@ RunResidual::HeldMotion RunResidual::hold_motion(const Solution& solution, const
   auto [chain, linear] = lin.eliminate->held(solution.linear, further, MatrixXd(0, unknowns_ - first_state_));
   result.linear = std::move(linear);
   const std::vector<MatrixXd> roots = chain.covariance_roots();
+  for (std::size_t p = count; p < pieces_.size(); ++p)  // behind the last reading: as open as these rows leave it
+    for (const Index row : rows.number[p]) result.variance[row] = 1;
   for (std::size_t p = 0; p < count; ++p) {
     const VectorXd variance = product(further[p].leftCols(roots[p].rows()), roots[p]).rowwise().squaredNorm();
     for (std::size_t i = 0; i < rows.number[p].size(); ++i) result.variance[rows.number[p][i]] = variance[static_cast<Index>(i)];

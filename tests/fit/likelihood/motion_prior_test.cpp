@@ -62,6 +62,15 @@ TEST(MotionPrior, GoesWithTheUnitOfTheAngle) {
   EXPECT_LT((rows - 3 * of_three).norm(), 0.05 * rows.norm());  // its search ends when scales change by 2 %
 }
 
+/// Where a record breaks off in a rough motion nothing says that it is smooth behind that: its scales go on from those before.
+TEST(MotionPrior, GoesOnBehindTheLastReading) {
+  const std::vector<MotionBasis::Window> one{{{40, 180}, 1}};
+  const Case c = shaken(one, run_cases::white_noise(141, 2e-3, 3), 1);
+  const VectorXd size = motion_prior(c.residual({25}), c.theta).rowwise().norm();
+  const double largest = size.maxCoeff();
+  EXPECT_LT(largest, 30 * size.head(20).maxCoeff());
+}
+
 /// A window that is rough does not make another one rough.
 TEST(MotionPrior, EachWindowHasItsOwnRoughness) {
   const Index first = windows.front().knots.length();
