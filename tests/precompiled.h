@@ -1,4 +1,4 @@
-// What nearly every file includes, and includes by itself: precompiled for the tests' objects and the sanitised floors, where it is a third of the compilation.
+// What nearly every file includes, and includes by itself: precompiled for the tests' objects and the sanitised floors, where it is a quarter to a third of the compilation.
 #pragma once
 #include <fmt/format.h>
 

@@ -338,7 +338,7 @@ TEST(Moving, FindsWhatNeverRests) {
   expect_whole(ramp, "a ramp");
 }
 
-/// A random walk ten times as large as the noise over the record, and noise of equal power in every octave.
+/// A random walk that goes twenty times as far as the noise over the record, and noise of equal power in every octave.
 TEST(Moving, TakesNoLargeWanderingForMotion) {
   for (unsigned seed = 1; seed <= 10; ++seed) {
     const VectorXd steps = white_noise(4 * length, 0.002, 400 + seed);

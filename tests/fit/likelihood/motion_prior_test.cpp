@@ -68,7 +68,7 @@ TEST(MotionPrior, GoesOnBehindTheLastReading) {
   const Case c = shaken(one, run_cases::white_noise(141, 2e-3, 3), 1);
   const VectorXd size = motion_prior(c.residual({25}), c.theta).rowwise().norm();
   const double largest = size.maxCoeff();
-  EXPECT_LT(largest, 30 * size.head(20).maxCoeff());
+  EXPECT_LT(largest, 30 * size.head(20).maxCoeff()) << "scales of neighbours differ by factors of two or three; at their floor the rows are 70 000 times as large";
 }
 
 /// A window that is rough does not make another one rough.
