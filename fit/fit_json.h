@@ -14,7 +14,7 @@ FittedRig read_fit(const nlohmann::json& fit, const std::string& path);
 template <class Json>
 Json learnt_json(const LearntOn& learnt_on) {
   Json out = Json::object();
-  for (const auto& [symbol, range] : learnt_on) out[std::string(symbol_names[static_cast<std::size_t>(symbol)])] = {range.lower, range.upper, symbol_units[static_cast<std::size_t>(symbol)]};
+  for (const auto& [symbol, range] : learnt_on) out[std::string(symbol_names[index_of(symbol)])] = {range.lower, range.upper, symbol_units[index_of(symbol)]};
   return out;
 }
 

@@ -33,7 +33,9 @@ using std::numbers::pi;
 struct Width {
   double mean, shared, own, cap;
 };
+namespace width {
 constexpr Width stiffness{-0.15, 0.3, 0.1, 36}, step_stiffness{-0.15, 0.3, 0.2, 36}, apparent{0.05, 0.15, 0, 0}, steady{-0.1, 0.3, 0.15, 100}, stalled_steady{-0.1, 0.3, 0.25, 100}, ring{0, 0.3, 0.6, 16};
+}  // namespace width
 
 constexpr double no_line = 4, impossible = 60;
 
@@ -70,7 +72,7 @@ double stiffness_distance(const std::vector<Reading>& readings) {
   for (double a = -widest; a <= widest; a += step) {
     std::vector<Reading> dry = readings;
     for (Reading& r : dry) r.value += r.share * a;
-    least = std::min(least, least_distance(dry, stiffness) + square((a - apparent.mean) / apparent.shared));
+    least = std::min(least, least_distance(dry, width::stiffness) + square((a - width::apparent.mean) / width::apparent.shared));
   }
   return least;
 }
@@ -95,13 +97,13 @@ double implausibility(const std::vector<RunEstimate>& estimates) {
     if (!e.looked_at) continue;
     sum += impossibilities(e);
     if (std::isfinite(e.stiffness))
-      stiffnesses.push_back({e.stiffness, e.fluid_share, e.kind == RunKind::step ? step_stiffness.own : stiffness.own});
+      stiffnesses.push_back({e.stiffness, e.fluid_share, e.kind == RunKind::step ? width::step_stiffness.own : width::stiffness.own});
     else
       sum += no_line;
-    if (std::isfinite(e.steady)) steadies.push_back({e.steady, 0, e.stalled ? stalled_steady.own : steady.own});
-    if (std::isfinite(e.ring)) rings.push_back({e.ring, 0, ring.own});
+    if (std::isfinite(e.steady)) steadies.push_back({e.steady, 0, e.stalled ? width::stalled_steady.own : width::steady.own});
+    if (std::isfinite(e.ring)) rings.push_back({e.ring, 0, width::ring.own});
   }
-  return sum + stiffness_distance(stiffnesses) + least_distance(steadies, steady) + least_distance(rings, ring);
+  return sum + stiffness_distance(stiffnesses) + least_distance(steadies, width::steady) + least_distance(rings, width::ring);
 }
 
 /// The campaign with what each run says. A step's line is sought at the stiffness of the free decays, of which the one nearest to the rig file counts.

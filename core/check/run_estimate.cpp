@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "core/model/wagner.h"
+#include "core/numerics/median.h"
 #include "core/numerics/spectrum.h"
 #include "core/propagate/response.h"
 #include "core/rig/structure.h"
@@ -31,12 +32,6 @@ VectorXd without_gaps(VectorXd x) {
   }
   for (Index j = last + 1; j < x.size(); ++j) x[j] = last < 0 ? 0.0 : x[last];
   return x;
-}
-
-double median(std::vector<double> values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
 }
 
 VectorXd median_filtered(const VectorXd& x) {
@@ -118,13 +113,13 @@ StepMotion motion_in(const VectorXd& column, double dt, double rest) {
 }
 
 /// The record around its first motion, where it is too long to be looked at whole.
-constexpr Index enough = 16384;
+constexpr Index longest = 16384;
 
 Run shortened(const Run& run, Index begin) {
-  if (run.samples() <= enough) return run;
-  const Index first = std::clamp<Index>(begin - enough / 4, 0, run.samples() - enough);
+  if (run.samples() <= longest) return run;
+  const Index first = std::clamp<Index>(begin - longest / 4, 0, run.samples() - longest);
   Run part = run;
-  for (Channel& channel : part.channels) channel.value = VectorXd(channel.value.segment(first, enough));
+  for (Channel& channel : part.channels) channel.value = VectorXd(channel.value.segment(first, longest));
   return part;
 }
 
@@ -154,7 +149,7 @@ double fluid_share(const CheckModel& check, double density) {
 }
 
 /// A line counts where its power is this many times the median: noise of a record of 2^15 lines reaches 15 (exp(-15) 2^15 = 0.01).
-constexpr double heard = 30;
+constexpr double stands_out = 30;
 
 /// Beyond this the lift curve bends (the samples: 2, 3 and 4 degrees against 25).
 constexpr double stall = 12 * pi / 180;
@@ -170,7 +165,7 @@ double ring_line(const VectorXd& gauge, double dt, double modelled, double refer
   const Spectrum spectrum = amplitude_spectrum(x, dt, Window::hann, 4 * x.size());
   const VectorXd power = spectrum.line.cwiseAbs2();
   const double floor = median({power.begin(), power.end()});
-  std::vector<Peak> peaks = peaks_above(power, VectorXd::Constant(power.size(), floor), heard);
+  std::vector<Peak> peaks = peaks_above(power, VectorXd::Constant(power.size(), floor), stands_out);
   std::erase_if(peaks, [&](const Peak& p) {
     const double ratio = p.position * spectrum.spacing / modelled;
     return ratio < 1 / width || ratio > width || p.line < leakage;
@@ -307,7 +302,7 @@ RunEstimate estimate(const CheckModel& check, const Run& run, double reference) 
   } else if (run.kind == RunKind::pluck) {
     const Run part = shortened(run, 0);
     const StrongestLine line = strongest_line(without_gaps(part.channel("gauge").value), part.dt);
-    if (line.over_noise > heard) {
+    if (line.over_noise > stands_out) {
       found.line = line.hertz;
       found.stiffness = 2 * std::log(line.hertz / found.modelled);
     }

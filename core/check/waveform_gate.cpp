@@ -10,7 +10,7 @@
 namespace unrig {
 namespace {
 
-constexpr double suspicious_misfit = 0.5, lowered_to = 0.25, alike = 1.3;
+constexpr double suspicious_misfit = 0.5, lowered_to = 0.25, as_good = 1.3;
 
 /// Root mean square of the misfits of the small steps; none: 0.
 double misfit_of(const CheckModel& model, const PlausibleCampaign& campaign, bool anew) {
@@ -70,7 +70,7 @@ std::optional<Suspicion> other_element(const PlausibleCampaign& campaign) {
   s.grave = true;
   std::string words;
   for (const Candidate& c : tried) {
-    if (s.causes.size() == 2 || c.misfit > alike * tried.front().misfit) break;
+    if (s.causes.size() == 2 || c.misfit > as_good * tried.front().misfit) break;
     s.causes.push_back(name_of(c, rig) + "?");
     words += (words.empty() ? "" : ", or ") + name_of(c, rig);
   }

@@ -13,7 +13,7 @@ double surge(const double* argument, const double*, double* slope, double*) {
   return 2 * argument[0] * argument[1];
 }
 
-constexpr const char* steps = "Record steps of several sizes at one speed.";
+constexpr const char* several_steps = "Record steps of several sizes at one speed.";
 
 }  // namespace
 
@@ -31,7 +31,7 @@ Effect speed_surge() {
   e.equation = "N -> (1 + 2 e) N of the steady and the circulatory load, e = a cos 2 pi f t + b sin 2 pi f t";
   e.kind = "speed";
   e.source = "Greenberg, NACA TN 1326 (1947)";
-  e.parameters = {{"frequency", "Hz", 1, 0.05, 50, false, "Record a longer run in the stream."}, {"steady_normal_force", "1", 0.3, -5, 5, true, steps}};
+  e.parameters = {{"frequency", "Hz", 1, 0.05, 50, false, "Record a longer run in the stream."}, {"steady_normal_force", "1", 0.3, -5, 5, true, several_steps}};
   e.starts = {Eigen::Vector2d(1, 0.3)};
   e.frequency = [](const AeroelasticModel&, const Conditions&, const Eigen::VectorXd& p) { return p[0]; };
   e.draw = [](const AeroelasticModel&, double, Effect::Random& random) { return log_between(random, {{0.3, 8}, {0.1, 0.8}}); };

@@ -21,4 +21,9 @@ inline std::string_view trimmed(std::string_view text) {
   return first == std::string_view::npos ? std::string_view{} : text.substr(first, text.find_last_not_of(" \t") - first + 1);
 }
 
+inline bool is_digit(char c) { return c >= '0' && c <= '9'; }
+
+/// Of a name: ASCII, and the underscore.
+inline bool is_letter(char c) { return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || c == '_'; }
+
 }  // namespace unrig

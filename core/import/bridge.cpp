@@ -8,7 +8,7 @@
 namespace unrig {
 namespace {
 
-constexpr std::array names = {std::pair{"quarter-1", BridgeKind::quarter_1}, std::pair{"quarter-2", BridgeKind::quarter_2}, std::pair{"half-1", BridgeKind::half_1},
+constexpr std::array kind_names = {std::pair{"quarter-1", BridgeKind::quarter_1}, std::pair{"quarter-2", BridgeKind::quarter_2}, std::pair{"half-1", BridgeKind::half_1},
                               std::pair{"half-2", BridgeKind::half_2},       std::pair{"full-1", BridgeKind::full_1},       std::pair{"full-2", BridgeKind::full_2},
                               std::pair{"full-3", BridgeKind::full_3}};
 
@@ -34,7 +34,7 @@ double Bridge::strain(double volts) const {
 
 BridgeKind bridge_from_name(const std::string& name) {
   std::string choices;
-  for (const auto& [known, kind] : names) {
+  for (const auto& [known, kind] : kind_names) {
     if (name == known) return kind;
     choices += std::string(choices.empty() ? "" : ", ") + known;
   }

@@ -9,8 +9,6 @@
 namespace unrig {
 namespace {
 
-bool is_digit(char c) { return c >= '0' && c <= '9'; }
-
 std::optional<double> number_with_point(std::string_view text) {
   double value = 0;
   if (text.empty() || read_number(text.data(), text.data() + text.size(), value) != text.data() + text.size()) return std::nullopt;

@@ -7,8 +7,6 @@
 namespace unrig {
 namespace {
 
-bool is_digit(char c) { return c >= '0' && c <= '9'; }
-
 /// Behind the quote that closes the one at `open`; `open` where none does.
 std::size_t behind_quotes(std::string_view line, std::size_t open) {
   for (std::size_t at = line.find('"', open + 1); at != std::string_view::npos; at = line.find('"', at + 2)) {

@@ -219,7 +219,7 @@ std::optional<Expression::Split> Expression::linear_in(Symbol symbol) const {
   if (((all.nodes_[found.rest].symbols | all.nodes_[found.factor].symbols) & bit) != 0) return std::nullopt;
   // The symbol stood in units of its scale.
   Node factor = found.factor;
-  if (const double per = per_scale_[static_cast<std::size_t>(symbol)]; per != 1) factor = all.make(Operation::multiply, all.number(per), factor);
+  if (const double per = per_scale_[index_of(symbol)]; per != 1) factor = all.make(Operation::multiply, all.number(per), factor);
   return Split{all.with_root(found.rest), all.with_root(factor)};
 }
 

@@ -14,6 +14,7 @@ namespace unrig {
 /// What a law may look at (correct/manual/laws.md), in SI.
 enum class Symbol : std::uint8_t { x, v, a, theta, theta_rate, twist, twist_rate, alpha, U, t, z };
 constexpr std::size_t symbol_count = 11;
+constexpr std::size_t index_of(Symbol symbol) { return static_cast<std::size_t>(symbol); }
 constexpr std::array<std::string_view, symbol_count> symbol_names{"x", "v", "a", "theta", "theta_rate", "twist", "twist_rate", "alpha", "U", "t", "z"};
 constexpr std::array<const char*, symbol_count> symbol_units{"m", "m/s", "m/s^2", "rad", "rad/s", "rad", "rad/s", "rad", "m/s", "s", "1"};
 

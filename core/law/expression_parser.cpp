@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
@@ -14,9 +15,8 @@
 namespace unrig {
 namespace {
 
-constexpr double infinite = std::numeric_limits<double>::infinity();
 
-bool any_number(const Range& r) { return r.lower == -infinite && r.upper == infinite; }
+bool any_number(const Range& r) { return std::isinf(r.lower) && std::isinf(r.upper); }
 
 }  // namespace
 
@@ -155,8 +155,6 @@ class ExpressionParser {
     return literal();
   }
 
-  static bool is_letter(char c) { return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || c == '_'; }
-  static bool is_digit(char c) { return c >= '0' && c <= '9'; }
 
   Node literal() {
     if (!is_digit(text_[at_]) && text_[at_] != '.') fail_here("a number, a name or \"(\"");
@@ -186,7 +184,7 @@ class ExpressionParser {
         part.index = static_cast<std::uint32_t>(s);
         part.symbols = 1u << s;
         const auto symbol = static_cast<Symbol>(s);
-        part.range = symbol == Symbol::U || symbol == Symbol::t ? Range{0, infinite} : Range{};
+        part.range = symbol == Symbol::U || symbol == Symbol::t ? Range{0, std::numeric_limits<double>::infinity()} : Range{};
         return expression_.add(part);
       }
     for (std::size_t k = 0; k < parameters_.size(); ++k)

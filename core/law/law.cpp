@@ -7,6 +7,7 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include "core/files/scan.h"
 #include "core/propagate/feedback_force.h"
 #include "core/files/near_word.h"
 #include "core/files/text_file.h"
@@ -17,12 +18,10 @@ namespace unrig {
 namespace {
 
 constexpr std::size_t most_parameters = most_law_parameters;
-constexpr std::pair<ActsOn, const char*> places[] = {{ActsOn::normal, "normal"}, {ActsOn::torsion, "torsion"}, {ActsOn::lift, "lift"}, {ActsOn::gauge, "gauge"}, {ActsOn::mount, "mount"}};
+constexpr std::pair<ActsOn, const char*> place_names[] = {{ActsOn::normal, "normal"}, {ActsOn::torsion, "torsion"}, {ActsOn::lift, "lift"}, {ActsOn::gauge, "gauge"}, {ActsOn::mount, "mount"}};
 
 constexpr double unbounded = 1e30;
 
-bool is_letter(char c) { return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || c == '_'; }
-bool is_digit(char c) { return c >= '0' && c <= '9'; }
 
 /// Names in the order in which they stand in an expression.
 void collect_names(const std::string& expression, std::vector<std::string>& names) {
@@ -167,7 +166,7 @@ void check_acceleration(const TomlTable& file, const Law& law) {
 /// The law at its start values, with every symbol zero but a stream.
 void check_rest(const TomlTable& file, const Law& law) {
   std::array<double, symbol_count> rest{}, in_symbols{};
-  rest[static_cast<std::size_t>(Symbol::U)] = 1;
+  rest[index_of(Symbol::U)] = 1;
   std::vector<double> start, in_parameters(law.parameters.size());
   for (const Parameter& p : law.parameters) start.push_back(p.start);
   const auto check = [&](const Expression& e, std::string_view key) {
@@ -184,7 +183,7 @@ std::string learnt_text(const LearntOn& learnt_on) {
   if (learnt_on.empty()) return "";
   std::string text = "[learnt_on]\n";
   for (const auto& [symbol, range] : learnt_on) {
-    const auto s = static_cast<std::size_t>(symbol);
+    const auto s = index_of(symbol);
     text += fmt::format("{0} = [\"{1} {3}\", \"{2} {3}\"]\n", symbol_names[s], range.lower, range.upper, symbol_units[s]);
   }
   return text;
@@ -196,7 +195,7 @@ std::string quantity(double value, const std::string& unit) { return unit == "1"
 }  // namespace
 
 std::string to_string(ActsOn place) {
-  return std::find_if(std::begin(places), std::end(places), [&](const auto& one) { return one.first == place; })->second;
+  return std::find_if(std::begin(place_names), std::end(place_names), [&](const auto& one) { return one.first == place; })->second;
 }
 
 std::string law_text(const Law& law) {
@@ -260,8 +259,8 @@ Law parse_law(const std::string& text, const std::string& file) {
   if (law.name.find_first_not_of(" \t") == std::string::npos || law.name.find_first_of("\r\n") != std::string::npos || law.name.size() > 100)
     table.fail("name", "a name that is empty, long or of several lines", "wanted up to 100 letters in one line");
   const std::string acts_on = table.text("acts_on");
-  const auto place = std::find_if(std::begin(places), std::end(places), [&](const auto& one) { return one.second == acts_on; });
-  if (place == std::end(places)) table.fail("acts_on", fmt::format("acts_on is \"{}\"", acts_on), "wanted one of normal, torsion, lift, gauge, mount");
+  const auto place = std::find_if(std::begin(place_names), std::end(place_names), [&](const auto& one) { return one.second == acts_on; });
+  if (place == std::end(place_names)) table.fail("acts_on", fmt::format("acts_on is \"{}\"", acts_on), "wanted one of normal, torsion, lift, gauge, mount");
   law.acts_on = place->first;
   law.force_text = table.text("force");
   law.memory_text = table.text_or("memory", "");

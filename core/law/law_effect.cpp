@@ -20,7 +20,6 @@ using Eigen::RowVectorXd;
 
 using Symbols = LawView::Symbols;
 
-std::size_t at(Symbol symbol) { return static_cast<std::size_t>(symbol); }
 
 /// An expression as the law of a feedback: of the arguments that it looks at.
 struct Seen {
@@ -117,7 +116,7 @@ class LawAtWork {
 
   LawView view_of(Index strip) const {
     LawView view = law_view(c_.model, system_, c_.conditions, strip);
-    if (clock_ >= 0) view.row[at(Symbol::t)] = state(clock_);
+    if (clock_ >= 0) view.row[index_of(Symbol::t)] = state(clock_);
     return view;
   }
 
@@ -131,7 +130,7 @@ class LawAtWork {
     feedback.sees = MatrixXd::Zero(std::max<Index>(1, static_cast<Index>(seen.symbol.size())), system_.states());
     if (expression.uses(Symbol::a)) feedback.sees_rates = feedback.sees;
     for (std::size_t k = 0; k < seen.symbol.size(); ++k) {
-      MatrixXd& sees = seen.symbol[k] == at(Symbol::a) ? feedback.sees_rates : feedback.sees;
+      MatrixXd& sees = seen.symbol[k] == index_of(Symbol::a) ? feedback.sees_rates : feedback.sees;
       sees.row(static_cast<Index>(k)).head(view.row[seen.symbol[k]].size()) = view.row[seen.symbol[k]];
     }
     feedback.first_parameter = c_.first_parameter;
@@ -173,7 +172,7 @@ class LawAtWork {
       system_.C.set_block(0, memory, push.outputs * factor);
       force = split->rest;
     }
-    view.row[at(Symbol::z)] = state(memory);
+    view.row[index_of(Symbol::z)] = state(memory);
     append_input({DualMatrix(MatrixXd(state(memory).transpose()), c_.theta.size()), DualMatrix(MatrixXd::Zero(system_.C.rows(), 1), c_.theta.size())}, feedback_of(*law_.memory, view, false));
     return force;
   }

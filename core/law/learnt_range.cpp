@@ -18,7 +18,6 @@ using Eigen::MatrixXd;
 using Eigen::RowVectorXd;
 using Eigen::VectorXd;
 
-std::size_t at(Symbol symbol) { return static_cast<std::size_t>(symbol); }
 
 void append_output(LinearSystem& system, const RowVectorXd& row, bool of_rates) {
   const Index before = system.C.rows();
@@ -58,7 +57,7 @@ double rounded_up(double x) {
 
 }  // namespace
 
-std::string told(Symbol symbol, const Range& range) { return fmt::format("{} is from {:.3g} to {:.3g} {}", symbol_names[at(symbol)], range.lower, range.upper, symbol_units[at(symbol)]); }
+std::string told(Symbol symbol, const Range& range) { return fmt::format("{} is from {:.3g} to {:.3g} {}", symbol_names[index_of(symbol)], range.lower, range.upper, symbol_units[index_of(symbol)]); }
 
 Range rounded_outward(const Range& range) { return {0 - rounded_up(-range.lower), rounded_up(range.upper)}; }
 

@@ -25,7 +25,7 @@ constexpr const char* wanted = "wanted a universal file with frequency response 
 
 /// What a ratio "m/s^2/N" is, and its scale to SI.
 struct Meaning {
-  Response response;
+  Measured response;
   std::string unit;  ///< SI, of the response
   double factor;
 };
@@ -41,9 +41,9 @@ Meaning meaning_of(const std::string& unit, const InputError::Place& place, cons
       return false;
     }
   };
-  for (const auto& [response, motion] : {std::pair{Response::displacement, "m"}, std::pair{Response::velocity, "m/s"}, std::pair{Response::acceleration, "m/s^2"}})
+  for (const auto& [response, motion] : {std::pair{Measured::displacement, "m"}, std::pair{Measured::velocity, "m/s"}, std::pair{Measured::acceleration, "m/s^2"}})
     if (is(motion)) return {response, motion, unit_scale(ratio, motion, place, what).factor};
-  return {Response::gauge, si, unit_scale(ratio, si, place, what).factor};
+  return {Measured::gauge, si, unit_scale(ratio, si, place, what).factor};
 }
 
 /// A name that a run file's column may have.
@@ -96,7 +96,7 @@ std::vector<FrequencyResponse> of_universal_file(const std::string& text, const 
     out.unit = meaning.unit;
     const bool same_line = f.node == f.reference_node && std::abs(f.direction) == std::abs(f.reference_direction);
     out.has_nodes = f.node > 0 && f.reference_node > 0;
-    out.driving_point = out.has_nodes && same_line && out.response != Response::gauge;
+    out.driving_point = out.has_nodes && same_line && out.response != Measured::gauge;
     const double sign = out.driving_point && f.direction != f.reference_direction ? -1 : 1;
     std::vector<complex<double>> value;
     for (const complex<double>& v : f.value) value.push_back(v * meaning.factor * sign);
@@ -150,8 +150,8 @@ FrequencyResponse of_table(const std::string& text, const std::string& path) {
 
 }  // namespace
 
-std::string to_string(Response response) {
-  return response == Response::gauge ? "gauge" : response == Response::displacement ? "displacement" : response == Response::velocity ? "velocity" : "acceleration";
+std::string to_string(Measured response) {
+  return response == Measured::gauge ? "gauge" : response == Measured::displacement ? "displacement" : response == Measured::velocity ? "velocity" : "acceleration";
 }
 
 std::vector<FrequencyResponse> read_frequency_responses(const std::string& path) {

@@ -8,14 +8,14 @@
 namespace unrig {
 
 /// What a frequency response function answers with, per newton.
-enum class Response { gauge, displacement, velocity, acceleration };
-std::string to_string(Response response);
+enum class Measured { gauge, displacement, velocity, acceleration };
+std::string to_string(Measured response);
 
 /// A frequency response function H(f) = response / force, in SI, of an impact or shaker test.
 struct FrequencyResponse {
   InputError::Place place;     ///< of its file
   std::string name;            ///< a column for it in run files: the file's name, or "3_Z" of node 3
-  Response response = Response::gauge;
+  Measured response = Measured::gauge;
   std::string unit;            ///< SI unit of the response
   bool has_nodes = false;      ///< the file says where response and force are
   bool driving_point = false;  ///< and they are in one place and direction

@@ -32,7 +32,7 @@ constexpr Index residuals = 2;             ///< terms of each function for modes
 constexpr double last_digit = 1e-6;        ///< of a coherence as files print it
 constexpr double most_damped = 0.3;        ///< beyond it a peak is none
 
-int order_of(Response response) { return response == Response::velocity ? 1 : response == Response::acceleration ? 2 : 0; }
+int order_of(Measured response) { return response == Measured::velocity ? 1 : response == Measured::acceleration ? 2 : 0; }
 
 /// A function ready to be fitted: angular frequency, (i w)^p, H and the standard deviation of its parts, up to a factor.
 struct Data {

@@ -29,7 +29,7 @@ Parts parts_of(const std::vector<FrequencyResponse>& functions) {
   for (std::size_t j = 0; j < functions.size(); ++j) {
     const FrequencyResponse& f = functions[j];
     const Index at = static_cast<Index>(j);
-    if (f.response == Response::gauge) {
+    if (f.response == Measured::gauge) {
       if (parts.gauge >= 0) throw InputError(f.place, fmt::format("\"{}\" is a second function of a gauge, beside \"{}\"", f.name, functions[static_cast<std::size_t>(parts.gauge)].name), "wanted one gauge at most, and motions", "A rig has one gauge; give the others' functions to a rig of their own.");
       parts.gauge = at;
       continue;

@@ -5,6 +5,7 @@
 #include <fmt/format.h>
 
 #include "core/model/aeroelastic_model.h"
+#include "core/numerics/median.h"
 #include "core/run/column_names.h"
 #include "core/files/error.h"
 #include "core/files/units.h"
@@ -61,9 +62,7 @@ double first_angle(const VectorXd& alpha) {
   constexpr std::size_t enough = 25;
   for (const double x : alpha)
     if (std::isfinite(x) && first.size() < enough) first.push_back(x);
-  if (first.empty()) return 0;
-  std::nth_element(first.begin(), first.begin() + static_cast<std::ptrdiff_t>(first.size() / 2), first.end());
-  return first[first.size() / 2];
+  return median(first);
 }
 
 }  // namespace

@@ -27,13 +27,13 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-struct Output {
+struct Simulated {
   std::string name, unit;
 };
 
 /// The gauge and every sensor, whether the run has recorded them or not.
-std::vector<Output> outputs_of(const Rig& rig, const Run& run) {
-  std::vector<Output> outputs;
+std::vector<Simulated> outputs_of(const Rig& rig, const Run& run) {
+  std::vector<Simulated> outputs;
   if (rig.has_gauge()) outputs.push_back({"gauge", rig.gauge_unit()});
   for (const Sensor& sensor : rig.sensors) {
     const Channel* recorded = run.find(sensor.column);
@@ -223,9 +223,9 @@ void warn_of_noise(const VectorXd& angle, std::vector<std::string>& warnings) {
 SimulateResult simulate(const SimulateProblem& problem) {
   const Run& run = problem.run;
   const Conditions conditions = conditions_for(problem);
-  const std::vector<Output> outputs = outputs_of(problem.model.rig(), run);
+  const std::vector<Simulated> outputs = outputs_of(problem.model.rig(), run);
   SimulateResult result;
-  for (const Output& output : outputs) result.simulated.push_back(output.name);
+  for (const Simulated& output : outputs) result.simulated.push_back(output.name);
   LinearSystem system = problem.model.system(conditions, problem.theta, result.simulated);
   for (DualMatrix* m : {&system.A, &system.B, &system.C, &system.D}) m->partial.clear();  // nobody asks for derivatives
   for (Feedback& f : system.feedback) f.steps_per_sample *= problem.law_steps;

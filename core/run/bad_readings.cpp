@@ -6,6 +6,7 @@
 #include <limits>
 #include <utility>
 
+#include "core/numerics/median.h"
 #include "core/run/motion.h"
 
 namespace unrig {
@@ -14,15 +15,7 @@ namespace {
 using Eigen::Index;
 using Eigen::VectorXd;
 
-constexpr double median_to_sigma = 1.482602218505602;  // 1 / Phi^-1(3/4), of absolute deviations
-constexpr double far = 10;                             // scales
-
-double median(std::vector<double> values) {
-  if (values.empty()) return 0;
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
+constexpr double far = 10;  // scales
 
 /// Of the medians over five samples.
 struct Range {

@@ -5,13 +5,14 @@
 #include <cmath>
 #include <stdexcept>
 
+#include "core/numerics/median.h"
+
 namespace unrig {
 namespace {
 
 using Eigen::Index;
 using Eigen::VectorXd;
 
-constexpr double median_to_sigma = 1.482602218505602;  // 1 / Phi^-1(3/4), of absolute deviations
 
 /// Coefficients of a cubic B-spline stretched by `stride` in splines on the fine knots: four boxes of that width, convolved.
 VectorXd two_scale(Index stride) {
@@ -23,13 +24,6 @@ VectorXd two_scale(Index stride) {
   }
   const double s = static_cast<double>(stride);
   return mask / (s * s * s);
-}
-
-double median(std::vector<double>& values) {
-  if (values.empty()) return 0;
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
 }
 
 double median_of_five(const VectorXd& x, Index k) {
@@ -215,11 +209,10 @@ double noise_level(const VectorXd& channel, int order) {
     for (int i = 0; i <= order; ++i) difference += binomial[static_cast<std::size_t>(i)] * channel[k + i];
     if (std::isfinite(difference)) differences.push_back(std::abs(difference));
   }
-  const std::vector<double> in_order = differences;
   const double robust = median_to_sigma * median(differences);
   // The median alone wastes two thirds of the data: mean square of all that lies within a cut, over that of a normal cut off there.
   constexpr double near = 3.5, near_variance = 0.99389, far = 10;  // as far out as a reading that is kept (core/run/bad_readings.h)
-  const bool tails = come_all_over(in_order, near * robust, order);
+  const bool tails = come_all_over(differences, near * robust, order);
   const double cut = tails ? far : near, cut_variance = tails ? 1 : near_variance;
   double sum = 0;
   Index count = 0;
@@ -321,9 +314,9 @@ bool moves_without_a_rest(const VectorXd& angle, double sigma, double quantum, c
     return change;
   };
   for (Index m = shortest;; m *= 2) {
-    std::vector<double> behind = changes(m), within = changes(m / 4);
+    const std::vector<double> behind = changes(m);
     if (behind.size() < 4 * fewest) return false;
-    const double change = median_to_sigma * median(behind), before = median_to_sigma * median(within), white = white_change(sigma, m / 4);
+    const double change = median_to_sigma * median(behind), before = median_to_sigma * median(changes(m / 4)), white = white_change(sigma, m / 4);
     if (change > std::max(chance * white_change(sigma, m), one_code * quantum)) return change * change > half_way * half_way * (before * before - white * white);
   }
 }
@@ -342,8 +335,7 @@ std::vector<Interval> moving_slowly(const VectorXd& angle, double sigma, double 
     change.push_back(change_of_means(sum, m, k));
   }
   if (change.size() < enough) return {};
-  std::vector<double> sorted = change;
-  const double least = std::max(chance * std::max(white_change(sigma, m), median_to_sigma * median(sorted)), one_code * quantum);
+  const double least = std::max(chance * std::max(white_change(sigma, m), median_to_sigma * median(change)), one_code * quantum);
   std::vector<Interval> intervals;
   for (std::size_t i = 0; i < at.size(); ++i) {
     if (!(change[i] > least)) continue;

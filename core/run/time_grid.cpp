@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/numerics/median.h"
+
 namespace unrig {
 namespace {
 
@@ -15,12 +17,6 @@ constexpr double rounding_steps = 1e-3;  ///< stamps this near to the grid are o
 constexpr double gap_steps = 1.5;
 constexpr double gap_steps_jittering = 5;
 constexpr Index make_up_samples = 5;  ///< how soon a late stamp must be made up
-
-double median(VectorXd values) {
-  const auto middle = values.begin() + values.size() / 2;
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
 
 VectorXd intervals(const VectorXd& stamps) { return stamps.tail(stamps.size() - 1) - stamps.head(stamps.size() - 1); }
 
@@ -68,7 +64,7 @@ class RepeatedStamps {
       : table_(table), time_(time), stamps_(time.value), extra_(static_cast<std::size_t>(time.value.size()), false) {
     const VectorXd interval = intervals(stamps_);
     // Gaps lengthen the mean, repeated stamps shorten it.
-    const double typical = median(interval);
+    const double typical = median({interval.begin(), interval.end()});
     step_ = typical > 0 ? std::min(typical, interval.mean()) : 0;
     constexpr double slack = 1.01;  // for the round-off of decimal fractions
     fine_ = typical > 0 && 2 * last_digit(stamps_) <= slack * typical;
@@ -143,7 +139,7 @@ bool is_made_up(const VectorXd& stamps, Index k, double step) {
 bool are_rounded(const VectorXd& stamps, double digit, double largest_jitter) {
   const VectorXd interval = intervals(stamps);
   const double slack = 1.01;  // for the round-off of decimal fractions
-  return digit > 0 && 2 * digit <= slack * median(interval) && largest_jitter <= slack * digit &&
+  return digit > 0 && 2 * digit <= slack * median({interval.begin(), interval.end()}) && largest_jitter <= slack * digit &&
          interval.maxCoeff() - interval.minCoeff() <= slack * digit;
 }
 
@@ -159,8 +155,9 @@ void refuse_gaps(const Stamps& judged, const CsvColumn& time, double digit) {
   const VectorXd& stamps = judged.value;
   const VectorXd interval = intervals(stamps);
   // Gaps lengthen the mean; coarse printing (1, 2, 2 ms) the median.
-  const double step = std::min(median(interval), interval.mean());
-  const bool jitters = median((interval.array() - step).abs().matrix()) > std::max(rounding_steps * step, digit);
+  const double step = std::min(median({interval.begin(), interval.end()}), interval.mean());
+  const VectorXd off = (interval.array() - step).abs();
+  const bool jitters = median({off.begin(), off.end()}) > std::max(rounding_steps * step, digit);
   const double limit = (jitters ? gap_steps_jittering : gap_steps) * step;
   for (Index k = 1; k < stamps.size(); ++k) {
     if (interval[k - 1] <= limit || is_made_up(stamps, k, step)) continue;

@@ -18,13 +18,13 @@ using Eigen::VectorXd;
 
 MatrixXd symmetric(const MatrixXd& a) { return 0.5 * (a + a.transpose()); }
 
-constexpr double enough = 1e-3;  // of a variance
+constexpr double small_change = 1e-3;  // of a variance
 constexpr int in_a_row = 4;      // a variance that oscillates comes by
 
 /// As far as these quantities tell.
 bool alike(const MatrixXd& rows, const MatrixXd& P, const MatrixXd& settled) {
   const VectorXd before = (rows * settled).cwiseProduct(rows).rowwise().sum(), now = (rows * P).cwiseProduct(rows).rowwise().sum();
-  return ((now - before).array().abs() < enough * before.array()).all();
+  return ((now - before).array().abs() < small_change * before.array()).all();
 }
 
 /// So many samples of the filter.
@@ -156,7 +156,7 @@ class Gaps {
     for (int forgotten = 0; behind > 0 && forgotten < in_a_row;) {
       const bool whole = behind >= stride_;
       back_to(behind - (whole ? stride_ : 1), whole, stretch(0, whole), P_);
-      forgotten = (value_behind.array() < enough * usual.array()).all() ? forgotten + 1 : 0;
+      forgotten = (value_behind.array() < small_change * usual.array()).all() ? forgotten + 1 : 0;
     }
     return end;
   }

@@ -10,7 +10,7 @@
 namespace unrig {
 namespace {
 
-constexpr int digits = 6;
+constexpr int shown_digits = 6;
 
 /// Columns that say something, and not the same thing twice: `warnings` has a table of its own, and what is empty in every row is left out.
 BatchTable without_empty_columns(const BatchTable& table) {
@@ -45,7 +45,7 @@ void add_batch(ReportPage& page, const BatchResult& result, const std::string& n
   const bool all_done = std::all_of(result.cases.begin(), result.cases.end(), [](const auto& one) { return one.second.status == CaseStatus::done; });
   page.add_verdict(all_done ? Tone::good : Tone::open, fmt::format("{} runs: {}.", result.rows.size(), count_of_rows(result)), name);
   page.add_section("Batch: " + name);
-  const BatchTable shown = without_empty_columns(table_of(result, digits));
+  const BatchTable shown = without_empty_columns(table_of(result, shown_digits));
   page.add_table("", shown.header, shown.rows,
                  "A row for each run file. What a command says of the whole campaign stands in the row of each of its runs. \"no answer\": exit status 1 of the command; \"unusable\": 2; \"left out\": no fit to rest on; \"failed\": a crash.");
   add_batch_warnings(page, result);

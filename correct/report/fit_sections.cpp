@@ -63,7 +63,7 @@ void add_laws(ReportPage& page, const FittedRig& fit) {
     const Law& law = law_of(*effect);
     page.add_equation(law.name, effect->equation, law.file);
     for (const auto& [symbol, range] : law.learnt_on) {
-      const auto s = static_cast<std::size_t>(symbol);
+      const auto s = index_of(symbol);
       rows.push_back({law.name, std::string(symbol_names[s]), plain(range.lower), plain(range.upper), symbol_units[s]});
     }
   }

@@ -17,7 +17,7 @@ using Eigen::Vector3d;
 using Eigen::VectorXd;
 using std::numbers::pi;
 
-enum : Index { normal_scale, torsion_scale, apparent_mass };
+enum : Index { normal_scale, torsion_scale, mass_coefficient };
 
 constexpr double scan_tolerance = 0.04;   // of a frequency
 constexpr double match_tolerance = 0.03;
@@ -79,7 +79,7 @@ std::optional<RigScales> scales_for(const ObservedRun& dry, const ObservedRun& w
     const NaturalFrequencies at = natural_frequencies(wet.system, {kn, ratio * kn, ca});
     // Newton in C_a on 1 / f^2, which for a single mode is linear in it.
     const double inverse_square = std::pow(at.hertz[0], -2);
-    const double slope = -2 * inverse_square * at.slope(0, apparent_mass) / at.hertz[0];
+    const double slope = -2 * inverse_square * at.slope(0, mass_coefficient) / at.hertz[0];
     const double step = (std::pow(wet_hertz, -2) - inverse_square) / slope;
     ca = std::max(ca + step, 0.02 * ca);
     if (!(ca > 1e-3 && ca < 1e3)) return {};
@@ -121,7 +121,7 @@ struct Solution {
 Solution solve(const ObservedRun& dry, const ObservedRun& wet, const RigScales& start, std::optional<double> common_error, double error_scale = 1) {
   const auto matched = [](const ObservedRun& run) { return std::count_if(run.observed.begin(), run.observed.end(), [](const ObservedFrequency& f) { return f.mode.has_value(); }); };
   LeastSquaresProblem problem;
-  for (const auto& [name, scale] : {std::pair("ln k_n", start[normal_scale]), std::pair("ln k_t", start[torsion_scale]), std::pair("ln C_a", start[apparent_mass])})
+  for (const auto& [name, scale] : {std::pair("ln k_n", start[normal_scale]), std::pair("ln k_t", start[torsion_scale]), std::pair("ln C_a", start[mass_coefficient])})
     problem.unknowns.push_back({name, std::log(scale)});
   ResidualTerm term;
   term.unknowns = {0, 1, 2};
@@ -194,7 +194,7 @@ void match_folded(ObservedRun& run, const Solution& solution) {
 }  // namespace
 
 NaturalFrequencies natural_frequencies(const UndampedSystem& s, const RigScales& scales) {
-  const Eigen::GeneralizedSelfAdjointEigenSolver<MatrixXd> eigen(stiffness_of(s, scales), s.mass + scales[apparent_mass] * s.fluid_mass);
+  const Eigen::GeneralizedSelfAdjointEigenSolver<MatrixXd> eigen(stiffness_of(s, scales), s.mass + scales[mass_coefficient] * s.fluid_mass);
   NaturalFrequencies f;
   f.shape = eigen.eigenvectors();
   const VectorXd omega2 = eigen.eigenvalues();
@@ -203,7 +203,7 @@ NaturalFrequencies natural_frequencies(const UndampedSystem& s, const RigScales&
   f.slope.resize(f.hertz.size(), 3);
   f.slope.col(normal_scale) = quadratic(s.normal_stiffness);
   f.slope.col(torsion_scale) = quadratic(s.torsion_stiffness);
-  f.slope.col(apparent_mass) = -omega2.cwiseProduct(quadratic(s.fluid_mass));
+  f.slope.col(mass_coefficient) = -omega2.cwiseProduct(quadratic(s.fluid_mass));
   f.slope = (8 * pi * pi * f.hertz).cwiseInverse().asDiagonal() * f.slope;  // d f = d omega^2 / (8 pi^2 f)
   return f;
 }

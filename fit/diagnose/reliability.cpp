@@ -18,7 +18,7 @@ struct Count {
 constexpr Count one_of_the_list{116, 119};  // an effect of the list by itself, which leaves nothing
 constexpr Count several{6, 6};              // more than one name; nothing is left
 constexpr Count formula{0, 2};              // a law on no list, by itself: all that was hidden is on the list
-constexpr Count description{1, 4};          // the rig's description by itself: an effect may hide behind it
+constexpr Count description_alone{1, 4};    // the rig's description by itself: an effect may hide behind it
 constexpr Count with_a_rest{8, 8};          // names, and something remains unexplained
 constexpr Count nothing_seen{27, 31};
 
@@ -29,7 +29,7 @@ double share_of_right(const Diagnosis& d) {
   if (d.unexplained) return with_a_rest.share();
   if (d.missing.size() > 1) return several.share();
   const std::string& name = d.missing.front().effect;
-  if (name == rig_description_id) return description.share();
+  if (name == rig_description_id) return description_alone.share();
   return is_law_id(name) ? formula.share() : one_of_the_list.share();
 }
 

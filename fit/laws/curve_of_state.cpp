@@ -51,8 +51,8 @@ std::vector<std::string> all_terms() {
 std::vector<Expression> expressions_of(const std::vector<std::string>& terms, const Reach& reach) {
   std::array<double, symbol_count> scales;
   scales.fill(1);
-  scales[static_cast<std::size_t>(Symbol::x)] = reach.x;
-  scales[static_cast<std::size_t>(Symbol::v)] = reach.v;
+  scales[index_of(Symbol::x)] = reach.x;
+  scales[index_of(Symbol::v)] = reach.v;
   std::vector<Expression> all;
   for (const std::string& term : terms) {
     all.emplace_back(term, std::vector<std::string>{});
@@ -66,8 +66,8 @@ MatrixXd forces_along(const std::vector<Expression>& terms, const MatrixXd& stat
   std::array<double, symbol_count> symbol{}, in_symbols{};
   MatrixXd forces(states.cols(), static_cast<Index>(terms.size()));
   for (Index k = 0; k < states.cols(); ++k) {
-    symbol[static_cast<std::size_t>(Symbol::x)] = states(0, k);
-    symbol[static_cast<std::size_t>(Symbol::v)] = states(1, k);
+    symbol[index_of(Symbol::x)] = states(0, k);
+    symbol[index_of(Symbol::v)] = states(1, k);
     for (std::size_t i = 0; i < terms.size(); ++i) forces(k, static_cast<Index>(i)) = -terms[i](symbol.data(), nullptr, in_symbols.data(), nullptr);
   }
   return forces;
@@ -106,7 +106,7 @@ Form form_of(const Sum& sum, const std::vector<std::string>& terms, const Reach&
     law.parameters.push_back({coefficient, "N", sum.coefficient[static_cast<Index>(k)], -1e30, 1e30, false, ""});
     const Expression expression(term, {});
     for (const auto& [symbol, most] : {std::pair{Symbol::x, reach.x}, {Symbol::v, reach.v}})
-      if (expression.uses(symbol)) law.scales[static_cast<std::size_t>(symbol)] = most;
+      if (expression.uses(symbol)) law.scales[index_of(symbol)] = most;
   }
   Form form;
   form.law = parse_law(law_text(law), "the search for a curve");

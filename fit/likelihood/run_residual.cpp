@@ -6,6 +6,7 @@
 
 #include <fmt/format.h>
 
+#include "core/numerics/median.h"
 #include "core/run/bad_readings.h"
 #include "core/model/run_inputs.h"
 #include "core/propagate/memory.h"
@@ -45,12 +46,9 @@ Index soft_edge(Index blocks, Index block, double white_scatter, Mean mean) {
   for (Index i = 0; i < blocks; ++i)
     if (const double m = mean(i); std::isfinite(m)) all.push_back(m);
   if (all.size() < 4) return 0;  // too short to have a level
-  std::nth_element(all.begin(), all.begin() + static_cast<std::ptrdiff_t>(all.size() / 2), all.end());
-  const double level = all[all.size() / 2];
+  const double level = median(all);
   for (double& m : all) m = std::abs(m - level);
-  std::nth_element(all.begin(), all.begin() + static_cast<std::ptrdiff_t>(all.size() / 2), all.end());
-  constexpr double deviations = 1.4826;  // of a normal distribution in its median absolute deviation
-  const double scatter = std::max(white_scatter, deviations * all[all.size() / 2]);  // coloured noise does not average out
+  const double scatter = std::max(white_scatter, median_to_sigma * median(all));  // coloured noise does not average out
   constexpr double chance = 4;           // standard deviations of a block's mean
   constexpr Index farthest = 25;  // blocks: a drift of the channel is no motion
   Index reach = 0;

@@ -4,6 +4,8 @@
 #include <cstddef>
 #include <vector>
 
+#include "core/numerics/median.h"
+
 namespace unrig {
 namespace {
 
@@ -30,8 +32,8 @@ StandsOut stands_out(const VectorXd& reading) {
   std::vector<double> sorted = within;
   std::sort(sorted.begin(), sorted.end());
   const auto place = [&](std::size_t quarters) { return sorted[quarters * sorted.size() / 4]; };
-  constexpr double quarter_to_sigma = 1.4826, clearly = 6;
-  const double middle = place(2), scatter = quarter_to_sigma * (middle - place(1));
+  constexpr double clearly = 6;
+  const double middle = place(2), scatter = median_to_sigma * (middle - place(1));
   const auto loud = [&](Index b) { return b >= 0 && b < blocks && within[static_cast<std::size_t>(b)] > middle + clearly * scatter; };
   StandsOut out;
   Index quiet = 0;

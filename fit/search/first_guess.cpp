@@ -5,6 +5,7 @@
 #include <numbers>
 #include <vector>
 
+#include "core/numerics/median.h"
 #include "core/numerics/spectrum.h"
 
 namespace unrig {
@@ -12,11 +13,6 @@ namespace {
 
 using Eigen::Index;
 using Eigen::VectorXd;
-
-double median(std::vector<double> values) {
-  std::sort(values.begin(), values.end());
-  return values[values.size() / 2];
-}
 
 struct Line {
   double frequency = 0;  ///< Hz; 0: none

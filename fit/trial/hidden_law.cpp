@@ -20,7 +20,7 @@ using Eigen::RowVectorXd;
 using Eigen::VectorXd;
 using Random = std::mt19937_64;
 
-constexpr Effect::Band force_size{0.02, 0.3}, exponent{0.5, 4}, corner{0.2, 1}, time_constant{0.02, 0.2};
+constexpr Effect::Band force_size{0.02, 0.3}, exponent{0.5, 4}, corner_place{0.2, 1}, time_constant{0.02, 0.2};
 constexpr double softest = 0.7;  // of the stiffness: beyond it a spring that pushes makes a rig with several places of rest
 
 /// Other ranges than the usual ones, in the same counts.
@@ -68,8 +68,6 @@ std::vector<Outside> outside_laws() {
   };
 }
 
-std::size_t at(Symbol symbol) { return static_cast<std::size_t>(symbol); }
-
 double scale_of(Symbol symbol, const Reach& r) { return symbol == Symbol::x ? r.x : symbol == Symbol::v ? r.v : 1; }
 
 Law law_of(const Outside& one, const Reach& r) {
@@ -79,7 +77,7 @@ Law law_of(const Outside& one, const Reach& r) {
   law.memory_text = one.memory;
   if (!law.memory_text.empty()) law.memory.emplace();
   law.scales.fill(1);
-  for (const Symbol s : one.scaled) law.scales[at(s)] = scale_of(s, r);
+  for (const Symbol s : one.scaled) law.scales[index_of(s)] = scale_of(s, r);
   for (const auto& [name, unit] : one.parameters) law.parameters.push_back({name, unit, 1, 0, 1e30, false, ""});
   return parse_law(law_text(law), "the laws of a trial");
 }
@@ -102,7 +100,7 @@ double one_of(const Parameter& p, const Reach& r) {
 Effect::Band range_of(const Law& form, const Parameter& p) {
   for (const Exception& e : exceptions)
     if (e.law == form.name && e.parameter == p.name) return e.range;
-  return p.unit == "1" ? exponent : p.unit == "s" ? time_constant : corner;
+  return p.unit == "1" ? exponent : p.unit == "s" ? time_constant : corner_place;
 }
 
 bool either_sign(const Law& form, const Parameter& p) {
@@ -120,7 +118,7 @@ Acts acts(const Law& law, const Reached& reached) {
   for (const Parameter& p : law.parameters) values.push_back(p.start);
   std::array<double, symbol_count> slope{};
   const bool twists = law.acts_on == ActsOn::torsion;
-  const std::size_t place = at(twists ? Symbol::twist : Symbol::x);
+  const std::size_t place = index_of(twists ? Symbol::twist : Symbol::x);
   Acts most;
   for (std::size_t r = 0; r < reached.symbols.size(); ++r) {
     const double still = law.uses(Symbol::t) ? 0 : law.force(reached.rest[r].data(), values.data(), slope.data(), partial.data());
@@ -131,7 +129,7 @@ Acts acts(const Law& law, const Reached& reached) {
     double z = 0;
     for (const auto& sample : reached.symbols[r].rowwise()) {
       RowVectorXd symbols = sample;
-      symbols[static_cast<Index>(at(Symbol::z))] = z;
+      symbols[static_cast<Index>(index_of(Symbol::z))] = z;
       most.force = std::max(most.force, std::abs(law.force(symbols.data(), values.data(), slope.data(), partial.data()) - still));
       most.pushes = std::max(most.pushes, slope[place]);
       if (law.memory) z += reached.dt * (*law.memory)(symbols.data(), values.data(), slope.data(), partial.data());
@@ -170,11 +168,11 @@ Rig with_sensors_of_laws(Rig rig) {
 MatrixXd symbols_of(const Run& run, RowVectorXd& rest) {
   const VectorXd& theta = run.channel("alpha").value;
   rest = RowVectorXd::Zero(symbol_count);
-  rest[static_cast<Index>(at(Symbol::theta))] = theta[0];
-  rest[static_cast<Index>(at(Symbol::alpha))] = theta[0];
-  rest[static_cast<Index>(at(Symbol::U))] = run.speed;
+  rest[static_cast<Index>(index_of(Symbol::theta))] = theta[0];
+  rest[static_cast<Index>(index_of(Symbol::alpha))] = theta[0];
+  rest[static_cast<Index>(index_of(Symbol::U))] = run.speed;
   MatrixXd symbols = rest.replicate(theta.size(), 1);
-  const auto column = [&](Symbol s) { return symbols.col(static_cast<Index>(at(s))); };
+  const auto column = [&](Symbol s) { return symbols.col(static_cast<Index>(index_of(s))); };
   for (const auto& [symbol, name] : sensed) {
     const VectorXd& value = run.channel(name).value;
     column(symbol) = value.array() - (run.kind == RunKind::pluck ? 0 : value[0]);
@@ -196,7 +194,7 @@ Reached reached_by(const Rig& rig, const std::vector<PlannedRun>& runs, const st
     const Run run = simulate(problem_of(model, truth ? *truth : model.start_values(), planned)).run;
     reached.symbols.push_back(symbols_of(run, reached.rest.emplace_back()));
     reached.dt = std::max(reached.dt, run.dt);
-    const auto most = [&](Symbol s) { return reached.symbols.back().col(static_cast<Index>(at(s))).cwiseAbs().maxCoeff(); };
+    const auto most = [&](Symbol s) { return reached.symbols.back().col(static_cast<Index>(index_of(s))).cwiseAbs().maxCoeff(); };
     for (const auto& [symbol, largest] : {std::pair{Symbol::x, &reach.x}, {Symbol::v, &reach.v}, {Symbol::twist, &reach.twist}, {Symbol::twist_rate, &reach.twist_rate}, {Symbol::alpha, &reach.alpha}, {Symbol::t, &reach.seconds}})
       *largest = std::max(*largest, most(symbol));
   }
@@ -214,7 +212,7 @@ std::vector<Law> laws_to_hide(const Rig& rig, const Reached& reached, bool outsi
     for (const Outside& one : outside_laws()) laws.push_back(law_of(one, reached.reach));
   else
     for (Form& form : dictionary(rig, reached.reach)) laws.push_back(std::move(form.law));
-  const auto moved = [&](Symbol s) { return std::any_of(reached.symbols.begin(), reached.symbols.end(), [&](const MatrixXd& run) { return !run.col(static_cast<Index>(at(s))).isZero(0); }); };
+  const auto moved = [&](Symbol s) { return std::any_of(reached.symbols.begin(), reached.symbols.end(), [&](const MatrixXd& run) { return !run.col(static_cast<Index>(index_of(s))).isZero(0); }); };
   std::erase_if(laws, [&](const Law& law) {
     for (std::size_t s = 0; s < symbol_count; ++s)
       if (static_cast<Symbol>(s) != Symbol::z && law.uses(static_cast<Symbol>(s)) && !moved(static_cast<Symbol>(s))) return true;

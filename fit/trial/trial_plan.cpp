@@ -9,6 +9,7 @@
 
 #include "core/effects/effect.h"
 #include "core/files/error.h"
+#include "core/numerics/median.h"
 #include "core/run/motion.h"
 #include "core/numerics/smooth_ramp.h"
 #include "fit/likelihood/run_residual.h"
@@ -92,9 +93,7 @@ double release_load(const VectorXd& gauge) {
   if (there.empty()) return 0;
   const double mean = VectorXd::Map(there.data(), static_cast<Index>(there.size())).mean();
   there.resize(std::min<std::size_t>(5, there.size()));
-  const auto middle = there.begin() + static_cast<std::ptrdiff_t>(there.size() / 2);
-  std::nth_element(there.begin(), middle, there.end());
-  return std::abs(*middle - mean);
+  return std::abs(median(there) - mean);
 }
 
 void move_like(const Rig& rig, const Run& recording, PlannedRun& planned) {

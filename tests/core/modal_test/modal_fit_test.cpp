@@ -27,16 +27,16 @@ std::vector<FrequencyResponse> measured(unsigned seed, bool noisy) {
   std::normal_distribution<double> normal;
   constexpr Index lines = 1200;
   std::vector<FrequencyResponse> functions(2);
-  functions[0].response = Response::acceleration;
+  functions[0].response = Measured::acceleration;
   functions[0].driving_point = functions[0].has_nodes = true;
   for (FrequencyResponse& f : functions) {
     f.frequency = Eigen::VectorXd::LinSpaced(lines, 4, 124);
     f.value.resize(lines);
     f.coherence.resize(lines);
-    const double floor = f.response == Response::acceleration ? 0.01 : 0.02;  // m/s^2/N; N/N
+    const double floor = f.response == Measured::acceleration ? 0.01 : 0.02;  // m/s^2/N; N/N
     for (Index k = 0; k < lines; ++k) {
       const double w = 2 * pi * f.frequency[k];
-      const bool acceleration = f.response == Response::acceleration;
+      const bool acceleration = f.response == Measured::acceleration;
       std::complex<double> h = acceleration ? std::complex<double>(2e-7 - 1e-2 / (w * w)) : 0.02;
       for (const Truth& t : truth) {
         const double wk = 2 * pi * t.frequency;
@@ -121,7 +121,7 @@ TEST(ModalFit, AModeJustOutsideOfTheBandIsLeftOut) {
     for (Index k = 0; k < f.value.size(); ++k) {
       const double w = 2 * pi * f.frequency[k], wk = 2 * pi * 190;
       const std::complex<double> beyond = 1.0 / 0.7 / std::complex<double>(wk * wk - w * w, 2 * 0.01 * wk * w);
-      f.value[k] += f.response == Response::acceleration ? -w * w * beyond : 3e4 * beyond;
+      f.value[k] += f.response == Measured::acceleration ? -w * w * beyond : 3e4 * beyond;
     }
   const ModalFit fit = fit_modes(functions, {0, averages});
   ASSERT_EQ(fit.modes.size(), 3u);
@@ -135,7 +135,7 @@ TEST(ModalFit, AModeJustOutsideOfTheBandIsLeftOut) {
 TEST(ModalFit, FindsNoModeWhereThereIsNone) {
   std::vector<FrequencyResponse> functions = measured(1, false);
   for (FrequencyResponse& f : functions)
-    for (Index k = 0; k < f.value.size(); ++k) f.value[k] = f.response == Response::acceleration ? -1e-3 * std::pow(2 * pi * f.frequency[k], 2) : 3.0;
+    for (Index k = 0; k < f.value.size(); ++k) f.value[k] = f.response == Measured::acceleration ? -1e-3 * std::pow(2 * pi * f.frequency[k], 2) : 3.0;
   EXPECT_THROW(fit_modes(functions, {}), NoAnswer);
 }
 
