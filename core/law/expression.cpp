@@ -165,10 +165,6 @@ Range Expression::range_of(const Part& part) const {
   }
 }
 
-bool Expression::uses_parameter(std::size_t k) const {
-  return std::any_of(used_parameters_.begin(), used_parameters_.end(), [&](const Leaf& leaf) { return leaf.index == k; });
-}
-
 void Expression::divide_by(const std::array<double, symbol_count>& scales) {
   for (std::size_t s = 0; s < symbol_count; ++s) per_scale_[s] /= scales[s];
 }

@@ -52,7 +52,6 @@ class Expression {
   void divide_by(const std::array<double, symbol_count>& scales);
 
   bool uses(Symbol symbol) const { return (nodes_[root_].symbols >> static_cast<unsigned>(symbol) & 1u) != 0; }
-  bool uses_parameter(std::size_t k) const;
   bool is_zero() const { return nodes_[root_].operation == Operation::number && nodes_[root_].number == 0; }
   /// Whether a name is one of the functions.
   static bool is_function(std::string_view name);

@@ -2,11 +2,9 @@
 
 #include <fmt/format.h>
 
-#include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 #include <numbers>
-#include <numeric>
 #include <stdexcept>
 #include <vector>
 
@@ -17,6 +15,7 @@
 #include "core/run/motion.h"
 #include "core/propagate/nonlinear_response.h"
 #include "core/propagate/response.h"
+#include "core/propagate/static_state.h"
 #include "core/model/rigid_system.h"
 #include "core/model/run_inputs.h"
 
@@ -81,16 +80,6 @@ Conditions conditions_for(const SimulateProblem& problem) {
     conditions.force = true;
   }
   return conditions;
-}
-
-/// States that stay where they are under a constant column of drive: -A^-1 column, over those that are at rest where the rig is.
-VectorXd static_state(const LinearSystem& system, const VectorXd& column) {
-  std::vector<Index> at_rest(static_cast<std::size_t>(system.free_states()));
-  std::iota(at_rest.begin(), at_rest.end(), Index{0});
-  at_rest.insert(at_rest.end(), system.settling.begin(), system.settling.end());
-  VectorXd state = VectorXd::Zero(system.states());
-  state(at_rest) = -MatrixXd(system.A.value(at_rest, at_rest)).partialPivLu().solve(VectorXd(column(at_rest)));
-  return state;
 }
 
 /// A shaft that jumps: between jumps the pitch is constant, at a jump the states jump too.

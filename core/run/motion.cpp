@@ -280,7 +280,7 @@ void widen(std::vector<Interval>& intervals, const VectorXd& smooth, Index reach
   }
 }
 
-constexpr double chance = 8;      // standard deviations
+constexpr double no_chance = 8;   // standard deviations
 constexpr double one_code = 1.5;  // quanta: a quiet converter that changes by one is no motion
 
 VectorXd running_sum(const VectorXd& x) {
@@ -317,7 +317,7 @@ bool moves_without_a_rest(const VectorXd& angle, double sigma, double quantum, c
     const std::vector<double> behind = changes(m);
     if (behind.size() < 4 * fewest) return false;
     const double change = median_to_sigma * median(behind), before = median_to_sigma * median(changes(m / 4)), white = white_change(sigma, m / 4);
-    if (change > std::max(chance * white_change(sigma, m), one_code * quantum)) return change * change > half_way * half_way * (before * before - white * white);
+    if (change > std::max(no_chance * white_change(sigma, m), one_code * quantum)) return change * change > half_way * half_way * (before * before - white * white);
   }
 }
 
@@ -335,7 +335,7 @@ std::vector<Interval> moving_slowly(const VectorXd& angle, double sigma, double 
     change.push_back(change_of_means(sum, m, k));
   }
   if (change.size() < enough) return {};
-  const double least = std::max(chance * std::max(white_change(sigma, m), median_to_sigma * median(change)), one_code * quantum);
+  const double least = std::max(no_chance * std::max(white_change(sigma, m), median_to_sigma * median(change)), one_code * quantum);
   std::vector<Interval> intervals;
   for (std::size_t i = 0; i < at.size(); ++i) {
     if (!(change[i] > least)) continue;

@@ -111,7 +111,6 @@ class RestlessRun {
   Eigen::Index motion_state() const { return motion_state_; }
   const Eigen::VectorXd& sigma() const { return sigma_; }
   double roughness() const { return roughness_; }  ///< tau over the noise of the angle
-  double angle_level() const { return conditions_.onset_angle; }
   double dt() const { return run_->dt; }
   const Conditions& conditions() const { return conditions_; }
   /// What gaps of more than some samples add to the variance of quantities (rows over the filter's states): samples x quantities, empty without such gaps.

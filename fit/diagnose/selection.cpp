@@ -180,27 +180,13 @@ bool Selection::takes_too_little(const Trial& screened, const Trial& base) const
 }
 
 const Trials& Selection::screened_alone() {
-  if (screened_.empty()) screened_ = screened_beside(baseline_, candidates({}, {}));
+  if (screened_.empty()) screened_ = screened_beside(fit_problem_, baseline_, candidates({}, {}));
   return screened_;
-}
-
-/// Each of `ids` beside `base`.
-Trials Selection::screened_beside(const Trial& base, const Strings& ids) const {
-  const Screening screening(fit_problem_, base.arrival);
-  std::vector<std::optional<Trial>> prepared(ids.size());
-  in_parallel(ids.size(), [&](std::size_t i) {
-    Strings set = base.effects;
-    set.push_back(ids[i]);
-    prepared[i] = screened(fit_problem_, screening, base, set);
-  });
-  Trials trials;
-  for (std::optional<Trial>& trial : prepared) trials.push_back(std::move(*trial));
-  return trials;
 }
 
 /// The best of all sets that have one effect more than `base`: all of them by one linear step, the promising ones in full.
 Trials Selection::try_one_more(const Trial& base, const Strings& hopeless) {
-  Trials prepared = base.effects.empty() ? screened_alone() : screened_beside(base, candidates(base.effects, hopeless));
+  Trials prepared = base.effects.empty() ? screened_alone() : screened_beside(fit_problem_, base, candidates(base.effects, hopeless));
   if (base.effects.empty()) std::erase_if(prepared, [&](const Trial& t) { return std::find(hopeless.begin(), hopeless.end(), t.effects.back()) != hopeless.end(); });
   std::sort(prepared.begin(), prepared.end(), [](const Trial& a, const Trial& b) { return a.score > b.score; });
   const double best_score = prepared.empty() ? 0 : prepared.front().score;

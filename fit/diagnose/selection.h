@@ -65,7 +65,6 @@ class Selection {
   /// Whether nothing has been found beside them.
   bool is_first(const Trial& base) const { return base.effects.size() == lines_.size(); }
   std::vector<std::string> candidates(const std::vector<std::string>& at_work, const std::vector<std::string>& hopeless) const;
-  std::vector<Trial> screened_beside(const Trial& base, const std::vector<std::string>& ids) const;
   std::vector<Trial> try_one_more(const Trial& base, const std::vector<std::string>& hopeless);
   Trial without_superfluous(Trial trial);
   void try_with_all_modes(std::vector<Trial>& tried);

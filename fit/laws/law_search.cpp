@@ -197,26 +197,18 @@ std::vector<std::string> LawSearch::of_the_list(const Trial& base) const {
   return ids;
 }
 
-/// Each of `ids` beside `base`.
-std::vector<Trial> LawSearch::screened_beside(const Trial& base, const std::vector<std::string>& ids) const {
-  std::vector<std::optional<Trial>> trials(ids.size());
-  std::vector<std::size_t> unknown;
-  for (std::size_t i = 0; i < ids.size(); ++i) {
-    const auto known = std::find_if(known_.screened.begin(), known_.screened.end(), [&](const Trial& t) { return t.effects.back() == ids[i]; });
-    if (&base == &base_ && known != known_.screened.end()) trials[i] = *known;
-    else unknown.push_back(i);
-  }
-  if (!unknown.empty()) {
-    const Screening screening(problem_, base.arrival);
-    in_parallel(unknown.size(), [&](std::size_t k) {
-      std::vector<std::string> set = base.effects;
-      set.push_back(ids[unknown[k]]);
-      trials[unknown[k]] = screened(problem_, screening, base, set);
-    });
-  }
-  std::vector<Trial> screened;
-  for (std::optional<Trial>& trial : trials) screened.push_back(std::move(*trial));
-  return screened;
+/// Each of `ids` beside `base`; beside the base of the search those that were screened before as they were.
+std::vector<Trial> LawSearch::all_screened_beside(const Trial& base, const std::vector<std::string>& ids) const {
+  const auto known = [&](const std::string& id) {
+    const auto found = std::find_if(known_.screened.begin(), known_.screened.end(), [&](const Trial& t) { return t.effects.back() == id; });
+    return &base == &base_ && found != known_.screened.end() ? &*found : nullptr;
+  };
+  std::vector<std::string> unknown;
+  std::copy_if(ids.begin(), ids.end(), std::back_inserter(unknown), [&](const std::string& id) { return !known(id); });
+  std::vector<Trial> anew = screened_beside(problem_, base, unknown), all;
+  auto next = anew.begin();
+  for (const std::string& id : ids) all.push_back(known(id) ? *known(id) : std::move(*next++));
+  return all;
 }
 
 /// Those that are worth a fit beside `base`: laws that promise the share `least` of what the best of all promises, and none where a signal promises more than any law. `known`: what was asked about before.
@@ -243,7 +235,7 @@ bool LawSearch::list_leaves_nothing() const {
 /// Forms that may explain what laws of the list do not, or as well. Of one that leaves nothing of a mismatch too large for two laws to explain alike only what promises more with no more parameters is a rival.
 LawSearch::Prospects LawSearch::rivals_promised() {
   const bool none = base_.reduced_chi2() > nearly_explained && list_leaves_nothing();
-  Prospects forms = prospects(base_, screened_beside(base_, forms_worth_a_fit(base_, promised_)), promised_, none ? 1 : half_of_it);
+  Prospects forms = prospects(base_, all_screened_beside(base_, forms_worth_a_fit(base_, promised_)), promised_, none ? 1 : half_of_it);
   const auto parameters = [&](const Trial& t) { return effect(problem_.rig, t.effects.back()).parameters_on(problem_.rig).size(); };
   const Trial* best = !found_.empty() ? &found_.front() : !known_.explain.empty() ? &known_.explain.front() : nullptr;
   if (none) std::erase_if(forms.laws, [&](const Trial& t) { return parameters(t) > parameters(*best); });
@@ -265,7 +257,7 @@ LawSearch::Prospects LawSearch::rivals_asked_for() {
     problem_.rig.laws.push_back(as_effect(a.form));
     ids.push_back(a.form.law.id());
   }
-  std::vector<Trial> screened = screened_beside(base_, ids);
+  std::vector<Trial> screened = all_screened_beside(base_, ids);
   return has_curve_ ? Prospects{std::move(screened), promised_} : prospects(base_, std::move(screened), promised_, 0);
 }
 
@@ -440,7 +432,7 @@ void LawSearch::try_the_first_two() {
 void LawSearch::follow_the_list() {
   std::vector<std::string> ids = of_the_list(base_);
   std::erase_if(ids, [&](const std::string& id) { return std::any_of(asked_.begin(), asked_.end(), [&](const AskedFor& a) { return a.form.listed == id; }); });
-  Prospects laws = prospects(base_, screened_beside(base_, ids), {});
+  Prospects laws = prospects(base_, all_screened_beside(base_, ids), {});
   promised_ = laws.promised;
   in_order_of_parameters(laws.laws);
   try_all(std::move(laws.laws), base_);
@@ -474,11 +466,11 @@ void LawSearch::look_for_a_second() {
   Trial first = found_.front();
   tell("looking for the law of what is missing beside " + first.effects.back());
   if (!first.is_settled && !decays_decide(first) && !all_driven(first.arrival.joint)) settle(first);  // its motions may not have been followed, along which the second is to be seen
-  Prospects second = prospects(first, screened_beside(first, of_the_list(first)), {});
+  Prospects second = prospects(first, screened_beside(problem_, first, of_the_list(first)), {});
   promised_ = second.promised;
   in_order_of_parameters(second.laws);
   try_all(std::move(second.laws), first);
-  if (goes_on()) try_all(prospects(first, screened_beside(first, forms_worth_a_fit(first, promised_)), promised_).laws, first);
+  if (goes_on()) try_all(prospects(first, screened_beside(problem_, first, forms_worth_a_fit(first, promised_)), promised_).laws, first);
 }
 
 /// What a second law made superfluous.

@@ -140,6 +140,7 @@ struct RunResidual::Linearised {
   std::unique_ptr<run_rows::ChainEliminator> eliminate;
   run_rows::ChainEliminator::Rotated rotated_links(const RunResidual& run, const std::vector<Eigen::MatrixXd>& reached, Eigen::Index columns) const;
   run_rows::ChainEliminator::Rotated rotated_whole(const RunResidual& run, std::vector<Eigen::MatrixXd> reached, Eigen::Index columns) const;
+  Eigen::VectorXd released(const RunResidual& run, const Eigen::VectorXd& theta) const;
   Eigen::VectorXd linear;
   double chi2 = 0;
   bool settled = false;  // of a nonlinear model: the search for c came to rest by itself, and would again

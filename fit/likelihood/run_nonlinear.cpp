@@ -4,6 +4,7 @@
 
 #include "core/numerics/product.h"
 #include "core/propagate/nonlinear_response.h"
+#include "core/propagate/static_state.h"
 #include "fit/likelihood/run_linearised.h"
 
 // RunResidual with nonlinear effects at work: the linear unknowns c by Gauss-Newton steps.
@@ -175,6 +176,28 @@ VectorXd RunResidual::without_laws(const Linearised& lin) const {
   return plain.linear;
 }
 
+/// c of a pluck that is let go at its first reading, from the deflection under a load that this reading tells, and comes to rest; empty of other runs. Where a law is strong, a search from elsewhere loses its way.
+VectorXd RunResidual::Linearised::released(const RunResidual& run, const VectorXd& theta) const {
+  if (run.run_->kind != RunKind::pluck || !run.model_->rig().takes_force() || run.conditions_.force || run.arrival_.rows() > 0) return {};
+  Conditions held = run.conditions_;
+  held.force = true;
+  const LinearSystem loaded = run.model_->system(held, theta, run.channels_);
+  const VectorXd deflected = static_state(loaded, loaded.B.value.col(0));
+  VectorXd c = VectorXd::Zero(run.unknowns_);
+  double told = 0, weight = 0;
+  for (Index k = 0; k < run.weight_.cols(); ++k) {
+    const VectorXd last = run.weight_.col(k).tail(run.weight_.rows() / 2).cwiseAbs2();
+    const double offset = last.sum() > 0 ? last.dot(run.measured_.col(k).tail(last.size())) / last.sum() : 0, reads = run.weight_(0, k) * loaded.C.value.row(k).dot(deflected);
+    told += reads * run.weight_(0, k) * (run.measured_(0, k) - offset);
+    weight += reads * reads;
+    c[run.first_offset_ + k] = offset;
+  }
+  if (!(weight > 0)) return {};
+  for (std::size_t i = 0; i < run.free_.size(); ++i)
+    if (run.free_[i] < deflected.size()) c[run.first_state_ + static_cast<Index>(i)] = told / weight * deflected[run.free_[i]];
+  return c;
+}
+
 /// Standard errors widen with what is left.
 bool RunResidual::worth_going_on(double promised, double chi2) const {
   constexpr double rounding = 1e-9;
@@ -182,7 +205,8 @@ bool RunResidual::worth_going_on(double promised, double chi2) const {
   return promised > linear_precision_ * linear_precision_ * left + rounding * chi2;
 }
 
-/// c that the last slopes lead to from where they were taken, else that of the last solution or, where there is none, of the linear part alone.
+/// c that the last slopes lead to from where they were taken, else that of the last solution or, where there is none, of the linear part alone. Where none of these follows a decay, what a record that grows leads
+/// to: of a pluck from its release, whatever the others say, and from the best of them where that does not follow it either.
 RunResidual::NonlinearPoint RunResidual::first_nonlinear_point(const Linearised& lin, const VectorXd& theta) const {
   NonlinearPoint best;
   const auto consider = [&](const VectorXd& linear) {
@@ -196,10 +220,20 @@ RunResidual::NonlinearPoint RunResidual::first_nonlinear_point(const Linearised&
   if (last_linear_.size() > 0) consider(last_linear_);
   if (!std::isfinite(best.chi2)) consider(without_laws(lin));
   if (glance_) return best;
-  constexpr double followed = 2;
-  const bool lost = motion_.unknowns() == 0 && best.chi2 * tempered_ * tempered_ > followed * static_cast<double>(degrees_of_freedom());
-  if (lost || from_afar_)
-    if (NonlinearPoint grown = along_growing_record(lin, theta, best); grown.chi2 < best.chi2) return grown;
+  const auto is_lost = [&] {
+    constexpr double followed = 2;
+    return motion_.unknowns() == 0 && best.chi2 * tempered_ * tempered_ > followed * static_cast<double>(degrees_of_freedom());
+  };
+  if (!is_lost() && !from_afar_) return best;
+  const auto grow = [&](const NonlinearPoint& from) {
+    if (NonlinearPoint grown = along_growing_record(lin, theta, from); grown.chi2 < best.chi2) best = std::move(grown);
+  };
+  const NonlinearPoint before = best;
+  if (const VectorXd c = lin.released(*this, theta); c.size() > 0) {
+    grow(nonlinear_point(lin, theta, c));
+    if (!is_lost()) return best;
+  }
+  grow(before);
   return best;
 }
 

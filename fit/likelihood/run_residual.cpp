@@ -39,7 +39,7 @@ double noise_of(const VectorXd& value) {
 namespace {
 
 /// How far a motion reaches into a rest beside it: a shaft that sets out softly has left its level long before a few samples show that it moves. Means over `block`
-/// samples, in turn from the motion on, until two lie on the rest's level, within what the rest's own means scatter by, and not less than `white_scatter`. `mean(i)`: of block i.
+/// samples, in turn from the motion on, until two lie on the rest's level, within what the rest's own means scatter by where it is long, and not less than `white_scatter`. `mean(i)`: of block i.
 template <class Mean>
 Index soft_edge(Index blocks, Index block, double white_scatter, Mean mean) {
   std::vector<double> all;
@@ -48,9 +48,10 @@ Index soft_edge(Index blocks, Index block, double white_scatter, Mean mean) {
   if (all.size() < 4) return 0;  // too short to have a level
   const double level = median(all);
   for (double& m : all) m = std::abs(m - level);
-  const double scatter = std::max(white_scatter, median_to_sigma * median(all));  // coloured noise does not average out
-  constexpr double chance = 4;           // standard deviations of a block's mean
+  constexpr double chance = 4;    // standard deviations of a block's mean
   constexpr Index farthest = 25;  // blocks: a drift of the channel is no motion
+  const bool is_mostly_rest = blocks > 2 * farthest;  // however far motions reach in on both sides
+  const double scatter = is_mostly_rest ? std::max(white_scatter, median_to_sigma * median(all)) : white_scatter;  // coloured noise does not average out
   Index reach = 0;
   for (Index i = 0; i < std::min(blocks, farthest) && i < reach + 2; ++i)
     if (std::abs(mean(i) - level) > chance * scatter) reach = i + 1;

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numeric>
+#include <optional>
 
 #include "core/effects/effect.h"
 #include "core/law/law_effect.h"
@@ -205,6 +206,20 @@ Trial screened(const FitProblem& problem, const Screening& screening, const Tria
   Trial trial{effects, std::move(extended.arrival), extended.left, extended.share};
   if (any_aside(trial.arrival.joint)) trial.decays = base.decays;
   return trial;
+}
+
+std::vector<Trial> screened_beside(const FitProblem& problem, const Trial& base, const std::vector<std::string>& ids) {
+  if (ids.empty()) return {};
+  const Screening screening(problem, base.arrival);
+  std::vector<std::optional<Trial>> each(ids.size());
+  in_parallel(ids.size(), [&](std::size_t i) {
+    std::vector<std::string> set = base.effects;
+    set.push_back(ids[i]);
+    each[i] = screened(problem, screening, base, set);
+  });
+  std::vector<Trial> trials;
+  for (std::optional<Trial>& trial : each) trials.push_back(std::move(*trial));
+  return trials;
 }
 
 bool may_be_seen(const Trial& screened, const Trial& base) {

@@ -59,6 +59,9 @@ Trial fit_baseline(const FitProblem& problem);
 /// `effects`, those of base and one or more: where their search begins, and as score what one linear step from `base` would remove. `screening`: of base.
 Trial screened(const FitProblem& problem, const Screening& screening, const Trial& base, const std::vector<std::string>& effects);
 
+/// The same of each of `ids` beside `base`, in their order.
+std::vector<Trial> screened_beside(const FitProblem& problem, const Trial& base, const std::vector<std::string>& ids);
+
 /// Whether what a law promises to first order could be decisive among the samples of `base`; of a base far from the noise always: a step says little there.
 bool may_be_seen(const Trial& screened, const Trial& base);
 

@@ -276,10 +276,6 @@ bool TrialOutcome::false_name() const {
   return std::any_of(found.begin(), found.end(), [&](const std::string& id) { return !has(hidden, id) && !(id == rig_description_id && !misread.empty()); });
 }
 
-bool TrialOutcome::among_equivalent() const {
-  return std::any_of(equivalent.begin(), equivalent.end(), [&](const Strings& set) { return name_of(set) == name_of(hidden); });
-}
-
 void tally(TrialResult& result) {
   std::vector<const LawOutcome*> laws;
   for (const TrialOutcome& o : result.outcomes)

@@ -63,7 +63,6 @@ struct TrialOutcome {
 
   bool right() const;          ///< exactly what was hidden was found; beside it, where files are misread, the rig's description may be
   bool false_name() const;     ///< something was found that was not there
-  bool among_equivalent() const;
   bool held() const;           ///< what was hidden is among the explanations, or something else is
 };
 
