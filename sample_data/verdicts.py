@@ -1,31 +1,38 @@
 #!/usr/bin/env python3
 """Verdicts of `unrig diagnose` on a folder of campaigns as a table.
 
-  python3 sample_data/verdicts.py build/unrig sample_data/concealed > VERDICTS.md
+  python3 sample_data/verdicts.py build/unrig sample_data/concealed [RESULTS] > VERDICTS.md
 
 Each campaign is a folder with rig.toml, runs (*.csv) and heldout.csv; truth_*.csv are not read. What `diagnose` says is written down as it comes out;
-what was true stands beside it where the folder has a KEY.json, which is opened for that column only.
+what was true stands beside it where the folder has a KEY.json, which is opened for that column only. The search ends by its counted work, whatever the machine's speed. RESULTS: a
+folder for what `diagnose` writes, NAME.json.gz.
 """
 import datetime
+import gzip
 import json
 import pathlib
 import subprocess
 import sys
 import tempfile
 
-LIMIT = 600  # seconds a campaign
+LIMIT = 1800  # seconds a campaign
 
 
-def diagnose(unrig, folder):
+def diagnose(unrig, folder, results=None):
     runs = sorted(p for p in folder.glob("*.csv") if p.name != "heldout.csv" and not p.name.startswith("truth"))
     with tempfile.TemporaryDirectory() as scratch:
         output = pathlib.Path(scratch) / "diagnosis.json"
-        command = [unrig, "diagnose", "--rig", folder / "rig.toml", *runs, "--heldout", folder / "heldout.csv", "-o", output]
+        command = [unrig, "diagnose", "--rig", folder / "rig.toml", *runs, "--heldout", folder / "heldout.csv", "--limit", "inf", "-o", output]
         try:
             subprocess.run([str(c) for c in command], capture_output=True, timeout=LIMIT, check=False)
         except subprocess.TimeoutExpired:
             return None
-        return json.loads(output.read_text()) if output.exists() else None
+        if not output.exists():
+            return None
+        if results:
+            results.mkdir(parents=True, exist_ok=True)
+            (results / f"{folder.name}.json.gz").write_bytes(gzip.compress(output.read_bytes(), mtime=0))
+        return json.loads(output.read_text())
 
 
 def truth(key, name):
@@ -40,11 +47,13 @@ def truth(key, name):
 def row(name, d, key):
     if d is None:
         return f"| {name} | no verdict within {LIMIT} s | | | | | |{truth(key, name)}"
-    found = ", ".join(f"{m['effect']} ({m['probability']:.3f})" for m in d["missing"]) or ("unexplained" if d["unexplained"] else "nothing missing")
+    name_of = lambda m: f"law: {m['law']['name']}, {m['equation']}".replace("|", "\\|") if m["effect"] == "law" else m["effect"]
+    found = ", ".join(f"{name_of(m)} ({m['probability']:.3f})" for m in d["missing"]) or ("unexplained" if d["unexplained"] else "nothing missing")
     if d["missing"] and d["unexplained"]:
         found += "; something remains"
     if d["equivalent"]:
         found += "; cannot be told from " + ", ".join(" + ".join(other) for other in d["equivalent"])
+    found += "; stopped" if d.get("stopped") else ""
     parameters = "; ".join(
         f"{p['name'].split('.', 1)[1]} {p['value']:.5g}" + (f" ± {p['std_error']:.2g}" if p["std_error"] is not None else "") + f" {p['unit']}"
         for m in d["missing"] for p in m["parameters"] if "run" not in p)
@@ -65,10 +74,11 @@ def table(named, key=None):
 
 def main():
     unrig, campaigns = sys.argv[1], pathlib.Path(sys.argv[2])
-    print(f"{datetime.date.today()}, `python3 sample_data/verdicts.py {unrig} {campaigns}`\n")
+    results = pathlib.Path(sys.argv[3]) if len(sys.argv) > 3 else None
+    print(f"{datetime.date.today()}, `python3 sample_data/verdicts.py {' '.join(sys.argv[1:])}`\n")
     answers = campaigns / "KEY.json"
     key = json.loads(answers.read_text()) if answers.exists() else None
-    table(((folder.name, diagnose(unrig, folder)) for folder in sorted(campaigns.iterdir()) if (folder / "rig.toml").exists()), key)
+    table(((folder.name, diagnose(unrig, folder, results)) for folder in sorted(campaigns.iterdir()) if (folder / "rig.toml").exists()), key)
 
 
 if __name__ == "__main__":

@@ -48,13 +48,14 @@ def said(d):
 
 def main():
     unrig, root, seconds, names = sys.argv[1], pathlib.Path(sys.argv[2]), sys.argv[3], sys.argv[4:]
-    print("| campaign | true | said | processor time [s] |\n| --- | --- | --- | --- |")
-    times = []
+    print("| campaign | true | said | multiplications [1e9] | processor time [s] |\n| --- | --- | --- | --- | --- |")
+    times, works = [], []
     for folder, effects in campaigns(root, names):
         d, used = diagnose(unrig, folder, seconds)
         times.append(used)
-        print(f"| {folder.name} | {', '.join(effects) or 'nothing'} | {said(d)} | {used:.1f} |", flush=True)
-    print(f"\n{len(times)} campaigns: median {statistics.median(times):.1f} s, 95 of 100 below {sorted(times)[min(len(times) - 1, int(0.95 * len(times)))]:.1f} s, longest {max(times):.1f} s.")
+        works.append(d["work"] if d else 0)
+        print(f"| {folder.name} | {', '.join(effects) or 'nothing'} | {said(d)} | {works[-1]:.1f} | {used:.1f} |", flush=True)
+    print(f"\n{len(times)} campaigns: median {statistics.median(times):.1f} s, 95 of 100 below {sorted(times)[min(len(times) - 1, int(0.95 * len(times)))]:.1f} s, longest {max(times):.1f} s; {sum(works):.0f}e9 multiplications, median {statistics.median(works):.1f}e9.")
 
 
 if __name__ == "__main__":
