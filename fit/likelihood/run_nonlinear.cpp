@@ -205,8 +205,8 @@ bool RunResidual::worth_going_on(double promised, double chi2) const {
   return promised > linear_precision_ * linear_precision_ * left + rounding * chi2;
 }
 
-/// c that the last slopes lead to from where they were taken, else that of the last solution or, where there is none, of the linear part alone. Where none of these follows a decay, what a record that grows leads
-/// to: of a pluck from its release, whatever the others say, and from the best of them where that does not follow it either.
+/// c that the last slopes lead to from where they were taken, else that of the last solution or, where there is none, of the linear part alone. Where these do not follow a decay, what a
+/// record that grows leads to from the best of them and, of a pluck, its release.
 RunResidual::NonlinearPoint RunResidual::first_nonlinear_point(const Linearised& lin, const VectorXd& theta) const {
   NonlinearPoint best;
   const auto consider = [&](const VectorXd& linear) {
@@ -220,20 +220,11 @@ RunResidual::NonlinearPoint RunResidual::first_nonlinear_point(const Linearised&
   if (last_linear_.size() > 0) consider(last_linear_);
   if (!std::isfinite(best.chi2)) consider(without_laws(lin));
   if (glance_) return best;
-  const auto is_lost = [&] {
-    constexpr double followed = 2;
-    return motion_.unknowns() == 0 && best.chi2 * tempered_ * tempered_ > followed * static_cast<double>(degrees_of_freedom());
-  };
-  if (!is_lost() && !from_afar_) return best;
-  const auto grow = [&](const NonlinearPoint& from) {
-    if (NonlinearPoint grown = along_growing_record(lin, theta, from); grown.chi2 < best.chi2) best = std::move(grown);
-  };
-  const NonlinearPoint before = best;
-  if (const VectorXd c = lin.released(*this, theta); c.size() > 0) {
-    grow(nonlinear_point(lin, theta, c));
-    if (!is_lost()) return best;
-  }
-  grow(before);
+  constexpr double followed = 2;
+  const bool lost = motion_.unknowns() == 0 && best.chi2 * tempered_ * tempered_ > followed * static_cast<double>(degrees_of_freedom());
+  if (!lost && !from_afar_) return best;
+  if (const VectorXd c = lin.released(*this, theta); c.size() > 0) consider(c);
+  if (NonlinearPoint grown = along_growing_record(lin, theta, best); grown.chi2 < best.chi2) return grown;
   return best;
 }
 
