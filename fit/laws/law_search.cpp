@@ -197,15 +197,15 @@ std::vector<std::string> LawSearch::of_the_list(const Trial& base) const {
   return ids;
 }
 
-/// Each of `ids` beside `base`; beside the base of the search those that were screened before as they were.
-std::vector<Trial> LawSearch::all_screened_beside(const Trial& base, const std::vector<std::string>& ids) const {
+/// Each of `ids` beside the base of the search; those that were screened before as they were.
+std::vector<Trial> LawSearch::screened_beside_base(const std::vector<std::string>& ids) const {
   const auto known = [&](const std::string& id) {
     const auto found = std::find_if(known_.screened.begin(), known_.screened.end(), [&](const Trial& t) { return t.effects.back() == id; });
-    return &base == &base_ && found != known_.screened.end() ? &*found : nullptr;
+    return found != known_.screened.end() ? &*found : nullptr;
   };
   std::vector<std::string> unknown;
   std::copy_if(ids.begin(), ids.end(), std::back_inserter(unknown), [&](const std::string& id) { return !known(id); });
-  std::vector<Trial> anew = screened_beside(problem_, base, unknown), all;
+  std::vector<Trial> anew = screened_beside(problem_, base_, unknown), all;
   auto next = anew.begin();
   for (const std::string& id : ids) all.push_back(known(id) ? *known(id) : std::move(*next++));
   return all;
@@ -235,7 +235,7 @@ bool LawSearch::list_leaves_nothing() const {
 /// Forms that may explain what laws of the list do not, or as well. Of one that leaves nothing of a mismatch too large for two laws to explain alike only what promises more with no more parameters is a rival.
 LawSearch::Prospects LawSearch::rivals_promised() {
   const bool none = base_.reduced_chi2() > nearly_explained && list_leaves_nothing();
-  Prospects forms = prospects(base_, all_screened_beside(base_, forms_worth_a_fit(base_, promised_)), promised_, none ? 1 : half_of_it);
+  Prospects forms = prospects(base_, screened_beside_base(forms_worth_a_fit(base_, promised_)), promised_, none ? 1 : half_of_it);
   const auto parameters = [&](const Trial& t) { return effect(problem_.rig, t.effects.back()).parameters_on(problem_.rig).size(); };
   const Trial* best = !found_.empty() ? &found_.front() : !known_.explain.empty() ? &known_.explain.front() : nullptr;
   if (none) std::erase_if(forms.laws, [&](const Trial& t) { return parameters(t) > parameters(*best); });
@@ -257,7 +257,7 @@ LawSearch::Prospects LawSearch::rivals_asked_for() {
     problem_.rig.laws.push_back(as_effect(a.form));
     ids.push_back(a.form.law.id());
   }
-  std::vector<Trial> screened = all_screened_beside(base_, ids);
+  std::vector<Trial> screened = screened_beside_base(ids);
   return has_curve_ ? Prospects{std::move(screened), promised_} : prospects(base_, std::move(screened), promised_, 0);
 }
 
@@ -432,7 +432,7 @@ void LawSearch::try_the_first_two() {
 void LawSearch::follow_the_list() {
   std::vector<std::string> ids = of_the_list(base_);
   std::erase_if(ids, [&](const std::string& id) { return std::any_of(asked_.begin(), asked_.end(), [&](const AskedFor& a) { return a.form.listed == id; }); });
-  Prospects laws = prospects(base_, all_screened_beside(base_, ids), {});
+  Prospects laws = prospects(base_, screened_beside_base(ids), {});
   promised_ = laws.promised;
   in_order_of_parameters(laws.laws);
   try_all(std::move(laws.laws), base_);

@@ -76,7 +76,7 @@ class LawSearch {
   Trial begun_with(const std::vector<AskedFor>& asked) const;
   void in_order_of_parameters(std::vector<Trial>& tried) const;
   Prospects rivals_asked_for();
-  std::vector<Trial> all_screened_beside(const Trial& base, const std::vector<std::string>& ids) const;
+  std::vector<Trial> screened_beside_base(const std::vector<std::string>& ids) const;
   Prospects prospects(const Trial& base, std::vector<Trial> screened, const Promised& known, double least = half_of_it) const;
   Prospects rivals_promised();
   bool signals_leave_nothing(const Promised& promised) const;
