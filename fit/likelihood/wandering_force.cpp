@@ -1,6 +1,7 @@
 #include "fit/likelihood/wandering_force.h"
 
 #include <Eigen/LU>
+#include <algorithm>
 #include <cmath>
 
 #include "core/numerics/product.h"
@@ -89,10 +90,6 @@ WanderingForce::WanderingForce(const DualMatrix& noise, const VectorXd& sigma, c
   const Index parameters = partials == Partials::all ? std::max({step.transition.parameters(), system.C.parameters(), noise.parameters()}) : 0;
   DualMatrix gain(MatrixXd::Zero(n, channels), parameters);
   gain.value(reached_, Eigen::all) = gain_;
-  struct Moved {
-    Index parameter;
-    MatrixXd closed, gain, observe, state;
-  };
   std::vector<Moved> moved;
   for (Index j = 0; j < parameters && m > 0; ++j) {
     if (!step.transition.depends_on(j) && !system.C.depends_on(j) && !kicks.depends_on(j)) continue;
@@ -106,38 +103,61 @@ WanderingForce::WanderingForce(const DualMatrix& noise, const VectorXd& sigma, c
     MatrixXd all = MatrixXd::Zero(n, channels);
     all(reached_, Eigen::all) = dk;
     gain.add_partial(j, all);
-    moved.push_back({j, da - gain_ * dc - dk * observe, dk, dc, MatrixXd::Zero(m, 1 + channels)});
+    moved.push_back({j, da - gain_ * dc - dk * observe, dk, dc});
   }
 
-  // Readings, and each of them raised by 1.
   readings_.resize(samples, channels);
   raised_.assign(static_cast<std::size_t>(channels), MatrixXd(samples, channels));
   slopes_.resize(static_cast<std::size_t>(parameters));
   for (const Moved& one : moved) slopes_[static_cast<std::size_t>(one.parameter)].resize(samples, channels * (1 + channels));
-  MatrixXd state = MatrixXd::Zero(m, 1 + channels), next(m, 1 + channels), now = MatrixXd::Identity(channels, 1 + channels);
-  now.rightCols(channels).setIdentity();
-  for (Index k = 0; k < samples; ++k) {
-    now.col(0) = readings.row(k).transpose();
-    const MatrixXd i = now - observe * state;
-    readings_.row(k) = i.col(0).transpose();
-    for (Index c = 0; c < channels; ++c) raised_[static_cast<std::size_t>(c)].row(k) = i.row(c).tail(channels);
-    for (Moved& one : moved) {
-      const MatrixXd slope = -(one.observe * state + observe * one.state);
-      slopes_[static_cast<std::size_t>(one.parameter)].row(k) = slope.reshaped().transpose();
-      set_product(closed, one.state, next);
-      add_product(one.closed, state, next);
-      next.noalias() += one.gain * now;
-      one.state.swap(next);
-    }
-    set_product(closed, state, next);
-    next.noalias() += gain_ * now;
-    state.swap(next);
-  }
+  filter(readings, closed, observe, moved);
 
   step.transition = step.transition - gain * system.C;
   if (system.D.cols() > 0 && step.input0.cols() == system.D.cols()) step.input0 = step.input0 - gain * system.D;
   if (partials == Partials::none)
     for (DualMatrix* changed : {&step.transition, &step.input0}) changed->partial.clear();
+}
+
+/// Readings, each of them raised by 1, and the slopes of both, some samples at a time: all that are driven at once are one product.
+void WanderingForce::filter(const MatrixXd& readings, const MatrixXd& closed, const MatrixXd& observe, const std::vector<Moved>& moved) {
+  constexpr Index at_a_time = 64;
+  const Index m = closed.rows(), channels = readings.cols(), each = 1 + channels, slopes = each * static_cast<Index>(moved.size());
+  MatrixXd state = MatrixXd::Zero(m, each), next(m, each), slope = MatrixXd::Zero(m, slopes), next_slope(m, slopes), seen(channels, slopes);
+  for (Index first = 0; first < readings.rows(); first += at_a_time) {
+    const Index count = std::min(at_a_time, readings.rows() - first);
+    MatrixXd now(channels, each * count), states(m, each * count), forced(m, each * count), moves(m, slopes * count), sees(channels, slopes * count);
+    for (Index k = 0; k < count; ++k) now.middleCols(k * each, each) << readings.row(first + k).transpose(), MatrixXd::Identity(channels, channels);
+    const MatrixXd driven = gain_ * now;
+    for (Index k = 0; k < count; ++k) {
+      states.middleCols(k * each, each) = state;
+      set_product(closed, state, next);
+      next += driven.middleCols(k * each, each);
+      state.swap(next);
+    }
+    const MatrixXd innovation = now - observe * states;
+    for (Index k = 0; k < count; ++k) {
+      readings_.row(first + k) = innovation.col(k * each).transpose();
+      for (Index c = 0; c < channels; ++c) raised_[static_cast<std::size_t>(c)].row(first + k) = innovation.row(c).segment(k * each + 1, channels);
+    }
+    for (std::size_t i = 0; i < moved.size(); ++i) {
+      forced.noalias() = moved[i].gain * now;
+      add_product(moved[i].closed, states, forced);
+      const MatrixXd sees_of_it = moved[i].observe * states;
+      for (Index k = 0; k < count; ++k) {
+        const Index at = k * slopes + static_cast<Index>(i) * each;
+        moves.middleCols(at, each) = forced.middleCols(k * each, each);
+        sees.middleCols(at, each) = sees_of_it.middleCols(k * each, each);
+      }
+    }
+    for (Index k = 0; k < count && slopes > 0; ++k) {
+      seen.noalias() = observe * slope;
+      seen += sees.middleCols(k * slopes, slopes);
+      for (std::size_t i = 0; i < moved.size(); ++i) slopes_[static_cast<std::size_t>(moved[i].parameter)].row(first + k) = -seen.middleCols(static_cast<Index>(i) * each, each).reshaped().transpose();
+      set_product(closed, slope, next_slope);
+      next_slope += moves.middleCols(k * slopes, slopes);
+      slope.swap(next_slope);
+    }
+  }
 }
 
 VectorXd WanderingForce::slope(Index j, Index channel, const VectorXd& offset) const {

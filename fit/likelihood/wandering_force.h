@@ -33,6 +33,13 @@ class WanderingForce {
   Eigen::MatrixXd foreseen(const Eigen::MatrixXd& innovations, const Eigen::MatrixXd& observe) const;
 
  private:
+  /// Partials of the filter in a parameter.
+  struct Moved {
+    Eigen::Index parameter;
+    Eigen::MatrixXd closed, gain, observe;
+  };
+  void filter(const Eigen::MatrixXd& readings, const Eigen::MatrixXd& closed, const Eigen::MatrixXd& observe, const std::vector<Moved>& moved);
+
   std::vector<Eigen::Index> reached_;  // states that the force moves
   Eigen::MatrixXd transition_, gain_;  // among these, the filter's feedback left out
   Eigen::MatrixXd readings_;
