@@ -26,6 +26,30 @@ double nearest_value(const JointProblem& fitted, const Unknown& wanted, double o
   return value;
 }
 
+/// What is left of the one run of `joint` once all that is free has been fitted, from where its motion stands.
+HeldoutResidual left_of(JointProblem joint) {
+  JointProblem::SolveOptions options;
+  options.iterations = 12;
+  options.tolerance = 1e-4;
+  options.precision = 0.1;  // what is predicted moves by less than its own noise
+  options.most_evaluations = 15;
+  RunResidual& residual = joint.runs().front();
+  if (residual.takes_small_steps(joint.theta(0))) options.enough = to_the_noise;  // slopes at corners promise more than steps keep
+  joint.solve(options);
+  constexpr double followed = 1.5;
+  if (joint.chi2() > followed * static_cast<double>(residual.degrees_of_freedom()) && find_motion(residual, joint.theta(0), true)) joint.solve(options);
+  if (residual.reject_spikes(joint.theta(0)) > 0) joint.solve(options);
+  const RunResidual::Prediction p = residual.predict(joint.theta(0));
+  const VectorXd weight = residual.channel_weight(0), left = residual.run().channel(p.channels.front()).value - p.output.col(0);
+  HeldoutResidual result{p.channels.front()};
+  double sum = 0, count = 0;
+  for (Index k = 0; k < left.size(); ++k)
+    if (weight[k] > 0 && std::isfinite(left[k])) sum += left[k] * left[k], ++count;
+  result.rms = p.output.allFinite() ? std::sqrt(sum / std::max(1.0, count)) : INFINITY;  // a model that runs away predicts nothing
+  result.noise = residual.noise(0);
+  return result;
+}
+
 }  // namespace
 
 HeldoutResidual predict_heldout(const Arrival& arrival, const Run& run) {
@@ -39,28 +63,10 @@ HeldoutResidual predict_heldout(const Arrival& arrival, const Run& run) {
     u.held = u.run < 0;
     u.value = nearest_value(arrival.joint, u, joint.runs().front().conditions().onset_angle);
   }
-  JointProblem::SolveOptions options;
-  options.iterations = 12;
-  options.tolerance = 1e-4;
-  options.precision = 0.1;  // what is predicted moves by less than its own noise
-  options.most_evaluations = 15;
   RunResidual& residual = joint.runs().front();
-  if (residual.takes_small_steps(joint.theta(0))) options.enough = to_the_noise;  // slopes at corners promise more than steps keep
   residual.follow_in(arrival.joint.runs().front().finer());
   find_motion(residual, joint.theta(0));
-  joint.solve(options);
-  constexpr double followed = 1.5;
-  if (joint.chi2() > followed * static_cast<double>(residual.degrees_of_freedom()) && find_motion(residual, joint.theta(0), true)) joint.solve(options);
-  if (residual.reject_spikes(joint.theta(0)) > 0) joint.solve(options);
-  const RunResidual::Prediction p = residual.predict(joint.theta(0));
-  const VectorXd weight = residual.channel_weight(0), left = run.channel(p.channels.front()).value - p.output.col(0);
-  HeldoutResidual result{p.channels.front()};
-  double sum = 0, count = 0;
-  for (Index k = 0; k < left.size(); ++k)
-    if (weight[k] > 0 && std::isfinite(left[k])) sum += left[k] * left[k], ++count;
-  result.rms = p.output.allFinite() ? std::sqrt(sum / std::max(1.0, count)) : INFINITY;  // a model that runs away predicts nothing
-  result.noise = residual.noise(0);
-  return result;
+  return left_of(std::move(joint));
 }
 
 HeldoutResidual predict_left_out(const Arrival& arrival, std::size_t run) {
@@ -77,7 +83,13 @@ HeldoutResidual predict_left_out(const Arrival& arrival, std::size_t run) {
   options.precision = 0.3;
   options.most_evaluations = 15;
   solve(without, options);
-  return predict_heldout(without, all.runs()[run].run());
+  JointProblem joint = all.part({run});
+  for (Unknown& u : joint.unknowns()) {
+    u.held = u.run < 0;
+    if (u.held) u.value = nearest_value(without.joint, u, 0);
+  }
+  joint.runs().front().temper(1);
+  return left_of(std::move(joint));
 }
 
 }  // namespace unrig

@@ -16,7 +16,7 @@ struct HeldoutResidual {
 /// the amplitudes of the effects' signals.
 HeldoutResidual predict_heldout(const Arrival& arrival, const Run& run);
 
-/// The fit without one of its runs, from where it stands, and that run predicted as if it had never been seen.
+/// What the fit without one of its runs, from where it stands, leaves of that run. What belongs to the run alone is fitted from where the fit of all has it: its start, not its value, is known.
 HeldoutResidual predict_left_out(const Arrival& arrival, std::size_t run);
 
 }  // namespace unrig
