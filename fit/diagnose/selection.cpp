@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <iterator>
+#include <numeric>
 #include <optional>
 
 #include <fmt/format.h>
@@ -257,7 +258,7 @@ Trial Selection::without_superfluous(Trial trial) {
   return trial;
 }
 
-/// Sets with another effect in place of `member`, fitted from `best`, where motions and theta are all but known: of those that were not fitted before the ones that promise half of what the member does.
+/// Sets with another effect in place of `member`, fitted from `best`, where motions and theta are all but known: of those that were not fitted before the ones that promise half of what the member does, for as long as they promise half of what is left of that.
 Trials Selection::rivals(const Trial& best, const std::string& member) {
   Strings fewer = best.effects;
   std::erase(fewer, member);
@@ -268,6 +269,9 @@ Trials Selection::rivals(const Trial& best, const std::string& member) {
   const Strings ids = candidates(best.effects, {});
   const bool of_a_law = is_a_law(member, best.arrival.joint), one_law_will_do = others.reduced_chi2() > nearly_explained;
   const Screening screening(fit_problem_, others.arrival);
+  // A rival may leave more, by what the member's parameters cost. Where a signal explains the runs a step tells nearly all of a law that does.
+  const double samples = std::accumulate(best.samples.begin(), best.samples.end(), 0.0), worth = decisive + (best.variables - others.variables) * std::log(samples);
+  const auto goal_of = [&](const Trial& trial) { return Goal{with_it * (1 + worth / samples), brings_a_law(trial) && one_law_will_do ? as_much : half_of_it}; };
   std::vector<std::optional<Trial>> prepared(ids.size());
   in_parallel(ids.size(), [&](std::size_t i) {
     Strings set = fewer;
@@ -276,16 +280,16 @@ Trials Selection::rivals(const Trial& best, const std::string& member) {
     Trial trial = screened(fit_problem_, screening, others, set);
     if (of_a_law && one_law_will_do && brings_a_law(trial)) return;  // too large a mismatch for two laws to explain alike
     if (takes_too_little(trial, others)) return;
-    const double least = brings_a_law(trial) && one_law_will_do ? as_much : half_of_it;  // where a signal explains the runs a step tells nearly all of a law that does
-    if (without - trial.promised_left > least * (without - with_it)) prepared[i] = std::move(trial);
+    if (!goal_of(trial).is_out_of_reach(without, without - trial.promised_left)) prepared[i] = std::move(trial);
   });
   Trials rivals;
   for (std::optional<Trial>& trial : prepared)
     if (trial) rivals.push_back(std::move(*trial));
   const auto follow = [&](Trial& rival) {
     hold_undetermined(rival);
-    if (!brings_a_law(rival)) fit_fully(rival, 2);
-    else if (!follow_nonlinear(fit_problem_, rival, others, others.reduced_chi2())) return;
+    const Goal goal = goal_of(rival);
+    if (!brings_a_law(rival)) fit_fully(rival, 2, goal);
+    else if (!follow_nonlinear(fit_problem_, rival, others, others.reduced_chi2(), goal)) return;
     if (leaves_nothing(rival) && !decays_decide(rival)) leave_out_terms(rival);
   };
   // Here a step tells much. Of a mismatch too large for two laws to explain alike none is followed behind one that leaves nothing.

@@ -128,13 +128,14 @@ JointProblem::Summary JointProblem::solve(const SolveOptions& options) {
   search.effort = options.restarts ? LeastSquaresOptions::Effort::until_arrived : LeastSquaresOptions::Effort::once;
   search.evaluations = options.most_evaluations;
   search.enough = options.enough * problem.degrees_of_freedom;
+  search.goal = options.goal;
   const LeastSquaresResult result = solve_least_squares(problem, search);
   for (RunResidual& run : runs_) {
     if (some_held) run.differentiate_only({});
     run.search_linear_to(finest);
   }
   for (std::size_t i = 0; i < unknowns_.size(); ++i) unknowns_[i].value = result.point.values[static_cast<Index>(i)];
-  return {result.arrived, result.point.finite ? result.chi2() : std::numeric_limits<double>::infinity(), result.evaluations, result.message};
+  return {result.arrived, result.point.finite ? result.chi2() : std::numeric_limits<double>::infinity(), result.evaluations, result.message, result.out_of_reach};
 }
 
 double JointProblem::Linearisation::chi2() const {

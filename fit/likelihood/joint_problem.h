@@ -48,12 +48,14 @@ class JointProblem {
     bool restarts = false;    ///< where it does not arrive, try other ways (LeastSquaresOptions::Effort::until_arrived)
     int most_evaluations = 400;
     double enough = 0;        ///< reduced chi-square with which the search ends wherever it stands
+    Goal goal = {};           ///< beyond whose reach it ends
   };
   struct Summary {
     bool converged = false;
     double chi2 = 0;
     int evaluations = 0;
     std::string message;
+    bool out_of_reach = false;  ///< of the goal
   };
   /// solve_least_squares over all unknowns that are not held.
   Summary solve(const SolveOptions& options);

@@ -229,11 +229,12 @@ std::vector<Unknown*> unknowns_of(JointProblem& joint, const std::string& id) {
   return own;
 }
 
-void solve(Arrival& arrival, const JointProblem::SolveOptions& options) {
-  const JointProblem::Summary summary = arrival.joint.solve(options);
+JointProblem::Summary solve(Arrival& arrival, const JointProblem::SolveOptions& options) {
+  JointProblem::Summary summary = arrival.joint.solve(options);
   arrival.evaluations += summary.evaluations;
   arrival.converged = summary.converged;
   arrival.message = summary.message;
+  return summary;
 }
 
 Arrival arrive(const FitProblem& problem, const std::shared_ptr<const AeroelasticModel>& model, const ArrivalEffort& effort) {

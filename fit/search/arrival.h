@@ -44,7 +44,7 @@ void set_starts(JointProblem& joint, const std::map<std::string, double>& starts
 Arrival arrive_with_effects(const FitProblem& problem, const Arrival& like, const ArrivalEffort& effort = {});
 
 /// Searches the least chi-square from where the fit stands.
-void solve(Arrival& arrival, const JointProblem::SolveOptions& options = {});
+JointProblem::Summary solve(Arrival& arrival, const JointProblem::SolveOptions& options = {});
 
 /// Noise levels from what the model leaves, spikes, and windows of the motion that the gauge asks to be wider; solves again after each.
 void refine(Arrival& arrival, const FitProblem& problem);

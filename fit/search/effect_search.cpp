@@ -44,7 +44,8 @@ double precision_at_corners(const JointProblem& joint) {
   return std::sqrt(some * freedom);
 }
 
-void anneal(Arrival& arrival, int rounds) {
+/// False where `goal`, told in the weights with which it begins, is out of reach.
+bool anneal(Arrival& arrival, int rounds, const Goal& goal = {}) {
   const bool has_corners = takes_small_steps(arrival.joint);
   for (int round = 0; round < rounds; ++round) {
     JointProblem::SolveOptions options;
@@ -52,10 +53,12 @@ void anneal(Arrival& arrival, int rounds) {
     options.tolerance = 1e-3;
     options.precision = has_corners ? precision_at_corners(arrival.joint) : 0.5;  // candidates differ by more than half a standard error, or cannot be told apart
     options.most_evaluations = 12;
-    solve(arrival, options);
+    if (round == 0) options.goal = goal;
+    if (solve(arrival, options).out_of_reach) return false;
     for (std::size_t r = 0; r < arrival.joint.runs().size(); ++r) settle_wandering(arrival.joint.runs()[r], arrival.joint.theta(r));
-    if (!temper(arrival.joint)) return;
+    if (!temper(arrival.joint)) break;
   }
+  return true;
 }
 
 /// Whether an effect is a nonlinear law in any of the runs.
@@ -252,10 +255,11 @@ Trial prepare(const FitProblem& problem, const Trial& base, const std::vector<st
   return fewer;
 }
 
-void fit_fully(Trial& trial, int rounds) {
-  anneal(trial.arrival, rounds);
+bool fit_fully(Trial& trial, int rounds, const Goal& goal) {
+  const bool reaches = anneal(trial.arrival, rounds, goal);
   measure(trial);
   trial.is_settled = false;
+  return reaches;
 }
 
 void settle(Trial& trial) {
@@ -426,13 +430,12 @@ void judge_decays(Trial& trial) {
   measure(trial);
 }
 
-void follow_further(Trial& trial, double least) {
+void follow_further(Trial& trial, double least, const Goal& goal) {
   if (decays_decide(trial)) return follow_motions(trial);
-  fit_fully(trial, 2);
-  if (trial.reduced_chi2() < least) fit_fully(trial, 6);
+  if (fit_fully(trial, 2, goal) && trial.reduced_chi2() < least) fit_fully(trial, 6);
 }
 
-bool follow_nonlinear(const FitProblem& problem, Trial& trial, const Trial& base, double least) {
+bool follow_nonlinear(const FitProblem& problem, Trial& trial, const Trial& base, double least, const Goal& goal) {
   if (all_driven(trial.arrival.joint)) {
     Trial guessed = trial;
     fit_from_first_guesses(problem, guessed);
@@ -446,7 +449,7 @@ bool follow_nonlinear(const FitProblem& problem, Trial& trial, const Trial& base
   }
   trial.ruled_out = !fit_decays_first(trial, base);
   if (trial.ruled_out) return false;
-  follow_further(trial, least);
+  follow_further(trial, least, goal);
   return true;
 }
 

@@ -86,18 +86,20 @@ void judge_decays(Trial& trial);
 bool fit_decays_first(Trial& trial, const Trial& base, bool from_here = false);
 
 /// Fits everything, in full where that leaves less than `least`, once fit_decays_first has told theta.
-void follow_further(Trial& trial, double least);
+void follow_further(Trial& trial, double least, const Goal& goal = {});
 
 /// Fits a prepared trial whose last effect is nonlinear: by the free decays first, then everything, in full where that leaves less than `least`; runs that are driven from first guesses, and
 /// where these leave more than half of what `base` does along trajectories that trust the law more and more, as free decays. False where the free decays speak against it.
-bool follow_nonlinear(const FitProblem& problem, Trial& trial, const Trial& base, double least);
+/// `goal`: beyond whose reach no more is fitted.
+bool follow_nonlinear(const FitProblem& problem, Trial& trial, const Trial& base, double least, const Goal& goal = {});
 
 /// The fit of a problem with its effects at work, by the road that a diagnosis takes to them: the best fit with nothing missing, the linear effects together, the nonlinear
 /// ones one after the other, and all over again from first guesses where they leave more than the noise.
 Arrival arrive_at_effects(const FitProblem& problem);
 
 /// Fits a prepared trial with everything free, while the weights of the runs return to those of their noise, in so many rounds.
-void fit_fully(Trial& trial, int rounds);
+/// False where it ended at once because `goal`, a chi-square with the weights that the runs have by now, is out of reach.
+bool fit_fully(Trial& trial, int rounds, const Goal& goal = {});
 
 /// Goes on to the least chi-square.
 void settle(Trial& trial);

@@ -31,11 +31,11 @@ class Walk {
   int evaluations = 0;
   LeastSquaresPoint point;
   Standing standing;
-  bool arrived = false;
+  bool arrived = false, out_of_reach = false;
 
   void run(const LeastSquaresPoint& start, SearchStrategy strategy) {
     point = start;
-    SearchLimits limits{options_.iterations, options_.relative_change, options_.precision, options_.enough};
+    SearchLimits limits{options_.iterations, options_.relative_change, options_.precision, options_.enough, options_.goal};
     // A search that creeps along a curved valley takes its small steps for convergence: it goes on until it no longer gains.
     constexpr double finer = 1e-3;
     while (true) {
@@ -44,11 +44,10 @@ class Walk {
       evaluations += outcome.evaluations;
       point = outcome.point;
       if (!point.finite) return;
-      if (point.chi2() < options_.enough) {
-        standing = unrig::standing(problem_, point);
-        arrived = true;
-        return;
-      }
+      standing = unrig::standing(problem_, point);
+      arrived = point.chi2() < options_.enough;
+      out_of_reach = options_.goal.is_out_of_reach(point.chi2(), standing.next.promised);
+      if (arrived || out_of_reach) return;
       evaluations += refine(problem_, options_.precision, point, standing);
       arrived = (standing.step_left <= std::max(arrival, options_.precision) || standing.within_rounding) && standing.next.rank >= rank_at_start_;
       limits.iterations -= std::max(1, outcome.iterations);
@@ -210,7 +209,7 @@ LeastSquaresResult solve_least_squares(const LeastSquaresProblem& problem, const
     const bool nearer = std::make_pair(!walk.arrived, walk.standing.step_left) < std::make_pair(!result.arrived, result.step_left);
     if (!lower && !(as_low && nearer)) return;
     result.point = walk.point, best = walk.standing;
-    result.arrived = walk.arrived, result.step_left = best.step_left;
+    result.arrived = walk.arrived, result.step_left = best.step_left, result.out_of_reach = walk.out_of_reach;
   };
   attempt(start, {});
   const bool first_arrived = result.arrived;

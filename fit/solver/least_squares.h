@@ -59,6 +59,13 @@ LeastSquaresPoint try_values(const LeastSquaresProblem& problem, const Eigen::Ve
 /// Variance factor chi2 / degrees of freedom; 1 where there are none.
 double variance_factor(const LeastSquaresProblem& problem, double chi2);
 
+/// A chi-square that a search is to get to, or it is of no use: it ends where its next step promises less than `share` of the way there.
+struct Goal {
+  double chi2 = std::numeric_limits<double>::infinity();
+  double share = 0;
+  bool is_out_of_reach(double now, double promised) const { return promised < share * (now - chi2); }
+};
+
 struct LeastSquaresOptions {
   int iterations = 400;           ///< of one attempt
   int evaluations = 20000;        ///< of all attempts together
@@ -73,6 +80,7 @@ struct LeastSquaresOptions {
   };
   Effort effort = Effort::until_arrived;
   double enough = 0;  ///< chi2 with which an attempt ends, as arrived, wherever it stands: where slopes mislead near the least
+  Goal goal = {};     ///< beyond whose reach an attempt ends, not arrived
 };
 
 struct LeastSquaresResult {
@@ -86,6 +94,7 @@ struct LeastSquaresResult {
   bool arrived = false;
   double step_left = 0;  ///< length of the Gauss-Newton step left, in standard errors: the relative offset
   int evaluations = 0;
+  bool out_of_reach = false;  ///< of LeastSquaresOptions::goal, where the best attempt ended
   std::vector<Attempt> attempts;
   std::string message;  ///< for people: what was needed, or what is in the way, by the names of the unknowns
 

@@ -133,7 +133,7 @@ class Cost : public ceres::CostFunction {
   mutable int evaluations_ = 0;
 };
 
-/// Ends the search where chi-square is low enough, or the Gauss-Newton step left is short: the step that would only confirm it is saved.
+/// Ends the search where chi-square is low enough, its goal is out of reach, or the Gauss-Newton step left is short: the step that would only confirm it is saved.
 class EnoughIsEnough : public ceres::IterationCallback {
  public:
   EnoughIsEnough(const LeastSquaresProblem& problem, const Cost& cost, const SearchLimits& limits) : problem_(problem), cost_(cost), limits_(limits) {}
@@ -142,7 +142,8 @@ class EnoughIsEnough : public ceres::IterationCallback {
     const LeastSquaresPoint& point = cost_.present();
     if (point.chi2() < limits_.enough) return ceres::SOLVER_TERMINATE_SUCCESSFULLY;
     const double promised = gauss_newton(problem_, point).promised;
-    return promised <= limits_.precision * limits_.precision * variance_factor(problem_, point.chi2()) ? ceres::SOLVER_TERMINATE_SUCCESSFULLY : ceres::SOLVER_CONTINUE;
+    const bool is_near = promised <= limits_.precision * limits_.precision * variance_factor(problem_, point.chi2());
+    return is_near || limits_.goal.is_out_of_reach(point.chi2(), promised) ? ceres::SOLVER_TERMINATE_SUCCESSFULLY : ceres::SOLVER_CONTINUE;
   }
 
  private:

@@ -24,6 +24,7 @@ struct SearchLimits {
   double relative_change = 0;  ///< of chi2 in one step
   double precision = 0;        ///< Gauss-Newton step left, in standard errors
   double enough = 0;           ///< chi2
+  Goal goal = {};
 };
 
 struct SearchOutcome {
