@@ -364,7 +364,7 @@ void Selection::take_known_lines(Trial& best) {
     lines_.push_back(id);
     best = std::move(with);
   }
-  if (!lines_.empty() && !what_remains(best).found) best = challenged(std::move(best));
+  if (!lines_.empty() && !what_remains(best).found) best = challenged(best);  // a copy: where the limits are reached the best stays what it is
 }
 
 /// Held against what may explain the runs in place of its members; then without what that made superfluous.
