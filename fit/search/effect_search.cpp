@@ -360,7 +360,7 @@ double moved_by_steps(const JointProblem& joint, Index times) {
 
 }  // namespace
 
-Trial in_finer_steps(Trial trial) {
+Trial in_finer_steps(const Trial& trial) {
   constexpr Eigen::Index finer = 4;
   if (trial.effects.empty() || !nonlinear(trial) || decays_decide(trial) || trial.reduced_chi2() > nearly_explained || trial.excess() == 0 || trial.arrival.joint.runs().front().finer() >= finer) return trial;
   constexpr double of_its_root = 0.293;  // 1 - sqrt(half_of_it): what moves the readings by less does not take half of what they are left with, by the triangle inequality

@@ -63,7 +63,8 @@ std::optional<Trial> followed_by_the_others(const Trial& trial, std::size_t lost
 
 }  // namespace
 
-Trial with_lost_runs_followed(Trial trial) {
+Trial with_lost_runs_followed(const Trial& first) {
+  Trial trial = first;
   if (trial.effects.empty() || !nonlinear(trial) || decays_decide(trial)) return trial;
   // Where most runs are left with something it is not the search that is at fault.
   if (2 * std::count_if(trial.variance.begin(), trial.variance.end(), [](double left) { return left < explained; }) <= static_cast<std::ptrdiff_t>(trial.variance.size())) return trial;
