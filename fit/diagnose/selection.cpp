@@ -258,7 +258,8 @@ Trial Selection::without_superfluous(Trial trial) {
   return trial;
 }
 
-/// Sets with another effect in place of `member`, fitted from `best`, where motions and theta are all but known: of those that were not fitted before the ones that promise half of what the member does, for as long as they promise half of what is left of that.
+/// Sets with another effect in place of `member`, fitted from `best`, where motions and theta are all but known: of those that were not fitted before the ones that promise half of what the member does; laws, which are dear, for as long as they promise as much of
+/// what is left of that.
 Trials Selection::rivals(const Trial& best, const std::string& member) {
   Strings fewer = best.effects;
   std::erase(fewer, member);
@@ -287,9 +288,8 @@ Trials Selection::rivals(const Trial& best, const std::string& member) {
     if (trial) rivals.push_back(std::move(*trial));
   const auto follow = [&](Trial& rival) {
     hold_undetermined(rival);
-    const Goal goal = goal_of(rival);
-    if (!brings_a_law(rival)) fit_fully(rival, 2, goal);
-    else if (!follow_nonlinear(fit_problem_, rival, others, others.reduced_chi2(), goal)) return;
+    if (!brings_a_law(rival)) fit_fully(rival, 2);
+    else if (!follow_nonlinear(fit_problem_, rival, others, others.reduced_chi2(), goal_of(rival))) return;
     if (leaves_nothing(rival) && !decays_decide(rival)) leave_out_terms(rival);
   };
   // Here a step tells much. Of a mismatch too large for two laws to explain alike none is followed behind one that leaves nothing.

@@ -45,7 +45,7 @@ double precision_at_corners(const JointProblem& joint) {
 }
 
 /// False where `goal`, told in the weights with which it begins, is out of reach.
-bool anneal(Arrival& arrival, int rounds, const Goal& goal = {}) {
+bool anneal(Arrival& arrival, int rounds, const Goal& goal) {
   const bool has_corners = takes_small_steps(arrival.joint);
   for (int round = 0; round < rounds; ++round) {
     JointProblem::SolveOptions options;
@@ -179,7 +179,7 @@ Trial fit_baseline(const FitProblem& problem) {
   const ArrivalEffort effort{false, 10, 0.5, 15};
   Trial trial{{}, arrive(problem, model, effort)};
   temper(trial.arrival.joint);
-  anneal(trial.arrival, 5);
+  anneal(trial.arrival, 5, {});
   measure(trial);
   return trial;
 }
@@ -255,12 +255,19 @@ Trial prepare(const FitProblem& problem, const Trial& base, const std::vector<st
   return fewer;
 }
 
-bool fit_fully(Trial& trial, int rounds, const Goal& goal) {
+namespace {
+
+/// False where it ended at once because `goal`, a chi-square with the weights that the runs have by now, is out of reach.
+bool fit_towards(const Goal& goal, Trial& trial, int rounds) {
   const bool reaches = anneal(trial.arrival, rounds, goal);
   measure(trial);
   trial.is_settled = false;
   return reaches;
 }
+
+}  // namespace
+
+void fit_fully(Trial& trial, int rounds) { fit_towards({}, trial, rounds); }
 
 void settle(Trial& trial) {
   solve(trial.arrival, {});
@@ -432,7 +439,7 @@ void judge_decays(Trial& trial) {
 
 void follow_further(Trial& trial, double least, const Goal& goal) {
   if (decays_decide(trial)) return follow_motions(trial);
-  if (fit_fully(trial, 2, goal) && trial.reduced_chi2() < least) fit_fully(trial, 6);
+  if (fit_towards(goal, trial, 2) && trial.reduced_chi2() < least) fit_fully(trial, 6);
 }
 
 bool follow_nonlinear(const FitProblem& problem, Trial& trial, const Trial& base, double least, const Goal& goal) {
@@ -482,7 +489,7 @@ void fit_from_first_guesses(const FitProblem& problem, Trial& trial) {
   const ArrivalEffort effort{false, 10, 0.5, 15};
   Trial other{trial.effects, arrive_with_effects(problem, trial.arrival, effort), trial.promised_left, trial.score};
   temper(other.arrival.joint);
-  anneal(other.arrival, 5);
+  anneal(other.arrival, 5, {});
   measure(other);
   if (trial.variance.empty() || bic_difference(other, trial) < 0) trial = std::move(other);
 }

@@ -98,8 +98,7 @@ bool follow_nonlinear(const FitProblem& problem, Trial& trial, const Trial& base
 Arrival arrive_at_effects(const FitProblem& problem);
 
 /// Fits a prepared trial with everything free, while the weights of the runs return to those of their noise, in so many rounds.
-/// False where it ended at once because `goal`, a chi-square with the weights that the runs have by now, is out of reach.
-bool fit_fully(Trial& trial, int rounds, const Goal& goal = {});
+void fit_fully(Trial& trial, int rounds);
 
 /// Goes on to the least chi-square.
 void settle(Trial& trial);
