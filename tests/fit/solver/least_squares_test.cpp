@@ -77,6 +77,33 @@ TEST(LeastSquares, EndsWhereChiSquareIsEnough) {
   EXPECT_LT(late.chi2(), 1e-6);
 }
 
+/// r = (x - 3, 2): chi-square falls from 13 at x = 0 to 4, of which a step promises all.
+TEST(LeastSquares, EndsWhereItsGoalIsOutOfReach) {
+  const LeastSquaresProblem problem = problem_of({named("x", 0)}, 2, [](const VectorXd& x, VectorXd& r, MatrixXd& jacobian) {
+    r << x[0] - 3, 2;
+    jacobian << 1, 0;
+    return true;
+  });
+  LeastSquaresOptions options;
+  options.effort = LeastSquaresOptions::Effort::once;
+  options.goal = {1, 0.8};  // 9 of 12
+  const LeastSquaresResult given_up = solve_least_squares(problem, options);
+  EXPECT_TRUE(given_up.out_of_reach);
+  EXPECT_FALSE(given_up.arrived);
+  EXPECT_EQ(given_up.point.values[0], 0) << "no step is taken";
+  options.goal = {1, 0.7};
+  const LeastSquaresResult after_a_step = solve_least_squares(problem, options);
+  EXPECT_TRUE(after_a_step.out_of_reach);
+  EXPECT_NEAR(after_a_step.point.values[0], 3, 1e-3) << "a step damped by the first trust region, 1e-4 of it";
+  for (const Goal& goal : {Goal{4.5, 0.8}, Goal{20, 0.8}, Goal{}}) {
+    options.goal = goal;
+    const LeastSquaresResult there = solve_least_squares(problem, options);
+    EXPECT_TRUE(there.arrived) << goal.chi2;
+    EXPECT_FALSE(there.out_of_reach) << goal.chi2;
+    EXPECT_NEAR(there.point.values[0], 3, 1e-6) << goal.chi2;
+  }
+}
+
 TEST(LeastSquares, HeldUnknownsStay) {
   const Line line;
   LeastSquaresProblem problem = linear({named("offset", 0), named("slope", 7)}, line.a, line.y);
