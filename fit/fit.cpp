@@ -43,7 +43,7 @@ double step_left(const JointProblem& joint) {
 }
 
 /// Halves the steps in which nonlinear laws are followed until half of them would move the unknowns by less than a third of a standard error, all together. The error
-/// of a law goes with the square of the step (core/propagate/nonlinear_response.h): three quarters of it show, and at most four ninths of a standard error are left.
+/// of a law goes with the square of the step (core/propagate/nonlinear_response.h): three quarters of it show, and at most four ninths of a standard error are left. By that law the next steps are chosen, and then looked at.
 void settle_steps(Arrival& arrival) {
   if (!follows_smooth_laws(arrival.joint)) return;
   constexpr Eigen::Index most = 8;
@@ -51,22 +51,28 @@ void settle_steps(Arrival& arrival) {
   const auto follow_in = [&](Eigen::Index times) {
     for (RunResidual& run : arrival.joint.runs()) run.follow_in(times);
   };
-  for (Eigen::Index times = 1; times < most; times *= 2) {
+  for (Eigen::Index times = 1; times < most;) {
     follow_in(2 * times);
-    if (step_left(arrival.joint) < hardly) return follow_in(times);
+    double left = step_left(arrival.joint);
+    if (left < hardly) return follow_in(times);
+    do {
+      times *= 2;
+      left /= 4;
+    } while (left >= hardly && times < most);
+    follow_in(times);
     solve(arrival);
   }
 }
 
 /// Noise, motion, and what the data cannot determine: each looked at again once the model fits.
-ParameterUncertainty settle(Arrival& arrival, const FitProblem& problem, bool steps, std::vector<std::string>& warnings) {
+ParameterUncertainty settle(Arrival& arrival, const FitProblem& problem, std::vector<std::string>& warnings) {
   refine(arrival, problem);
   if (const std::string warning = no_worse_than_start(arrival, problem); !warning.empty()) {
     warnings.push_back(warning);
     refine(arrival, problem);
   }
-  if (steps && problem.effects.empty()) look_elsewhere(arrival);
-  if (steps) settle_steps(arrival);
+  if (problem.effects.empty()) look_elsewhere(arrival);
+  settle_steps(arrival);
   ParameterUncertainty uncertainty = estimate_uncertainty(arrival.joint);
   constexpr int rounds = 4;  // what was a line of the noise may turn out to be nothing at all once its damping is held
   const auto hold = [&] { return hold_unheard(arrival.joint, uncertainty, problem.start) || hold_weak(arrival.joint, uncertainty, problem.start); };
@@ -132,7 +138,7 @@ FitResult describe_fit(Arrival& arrival, const FitProblem& problem, Settle first
   result.warnings = problem.rig.warnings;
   for (const Run& run : problem.runs) result.warnings.insert(result.warnings.end(), run.warnings.begin(), run.warnings.end());
   for (RunResidual& run : arrival.joint.runs()) run.temper(1);
-  ParameterUncertainty uncertainty = first == Settle::nothing ? estimate_uncertainty(arrival.joint) : settle(arrival, problem, first == Settle::steps, result.warnings);
+  ParameterUncertainty uncertainty = first == Settle::nothing ? estimate_uncertainty(arrival.joint) : settle(arrival, problem, result.warnings);
   InexactUncertainty with_numbers;
   if (inexact) {
     inexact->search(arrival);
@@ -189,7 +195,7 @@ FitResult fit_in_order(const FitProblem& problem) {
   Arrival arrival = problem.effects.empty() ? arrive(problem, model, effort) : arrive_at_effects(problem);
   check_lengths(arrival.joint);
   if (inexact) inexact->search(arrival);
-  FitResult result = describe_fit(arrival, problem, Settle::steps, inexact ? &*inexact : nullptr);
+  FitResult result = describe_fit(arrival, problem, Settle::all, inexact ? &*inexact : nullptr);
   result.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
   return result;
 }

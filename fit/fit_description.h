@@ -10,9 +10,8 @@ namespace unrig {
 
 /// What a finished fit says of itself.
 
-/// What is to be done before: nothing; noise levels, spikes and the motion's windows looked at again, and what the data cannot determine held; and the steps in which
-/// nonlinear laws are followed halved until that moves nothing, which takes several times as long.
-enum class Settle { nothing, noise, steps };
+/// What is to be done before: nothing; or noise levels, spikes and the motion's windows looked at again, what the data cannot determine held, and the steps in which nonlinear laws are followed halved until that moves nothing.
+enum class Settle { nothing, all };
 
 class InexactRig;
 

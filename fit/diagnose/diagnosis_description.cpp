@@ -50,7 +50,7 @@ bool is_idle(const JointProblem& joint, const std::string& id) {
   return false;
 }
 
-Settle settled(const Trial& trial) { return trial.reduced_chi2() < twice_the_noise ? Settle::noise : Settle::nothing; }
+Settle settled(const Trial& trial) { return trial.reduced_chi2() < twice_the_noise ? Settle::all : Settle::nothing; }
 
 double probability_of(const std::string& id, const std::vector<Candidate>& ranking) {
   double sum = 0;
@@ -76,7 +76,7 @@ void describe(const FitProblem& fit_problem, const Trial& baseline, const Search
     before_arrival = std::move(plain.arrival);
     if (plain.baseline_was_lost) d.not_followed.insert(d.not_followed.begin(), std::vector<std::string>{});
   }
-  d.before = told(before_arrival, fit_problem, d.mismatch.found ? Settle::nothing : Settle::noise, limits);  // a fit that explains nothing deserves no refinement
+  d.before = told(before_arrival, fit_problem, d.mismatch.found ? Settle::nothing : Settle::all, limits);  // a fit that explains nothing deserves no refinement
   e.fit = best.effects.empty() && !described ? d.before : fit_with(e, limits);
   d.after = e.fit;
   if (described && best.effects.empty()) d.after = d.before;

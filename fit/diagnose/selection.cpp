@@ -270,9 +270,10 @@ Trials Selection::rivals(const Trial& best, const std::string& member) {
   const Strings ids = candidates(best.effects, {});
   const bool of_a_law = is_a_law(member, best.arrival.joint), one_law_will_do = others.reduced_chi2() > nearly_explained;
   const Screening screening(fit_problem_, others.arrival);
-  // A rival may leave more, by what the member's parameters cost. Where a signal explains the runs a step tells nearly all of a law that does.
+  // Where a signal explains the runs a step tells nearly all of a law that does.
+  const auto share_of = [&](const Trial& trial) { return brings_a_law(trial) && one_law_will_do ? as_much : half_of_it; };
+  // What is followed may leave more, by what the member's parameters cost.
   const double samples = std::accumulate(best.samples.begin(), best.samples.end(), 0.0), worth = decisive + (best.variables - others.variables) * std::log(samples);
-  const auto goal_of = [&](const Trial& trial) { return Goal{with_it * (1 + worth / samples), brings_a_law(trial) && one_law_will_do ? as_much : half_of_it}; };
   std::vector<std::optional<Trial>> prepared(ids.size());
   in_parallel(ids.size(), [&](std::size_t i) {
     Strings set = fewer;
@@ -281,7 +282,7 @@ Trials Selection::rivals(const Trial& best, const std::string& member) {
     Trial trial = screened(fit_problem_, screening, others, set);
     if (of_a_law && one_law_will_do && brings_a_law(trial)) return;  // too large a mismatch for two laws to explain alike
     if (takes_too_little(trial, others)) return;
-    if (!goal_of(trial).is_out_of_reach(without, without - trial.promised_left)) prepared[i] = std::move(trial);
+    if (without - trial.promised_left > share_of(trial) * (without - with_it)) prepared[i] = std::move(trial);
   });
   Trials rivals;
   for (std::optional<Trial>& trial : prepared)
@@ -289,7 +290,7 @@ Trials Selection::rivals(const Trial& best, const std::string& member) {
   const auto follow = [&](Trial& rival) {
     hold_undetermined(rival);
     if (!brings_a_law(rival)) fit_fully(rival, 2);
-    else if (!follow_nonlinear(fit_problem_, rival, others, others.reduced_chi2(), goal_of(rival))) return;
+    else if (!follow_nonlinear(fit_problem_, rival, others, others.reduced_chi2(), {with_it * (1 + worth / samples), share_of(rival)})) return;
     if (leaves_nothing(rival) && !decays_decide(rival)) leave_out_terms(rival);
   };
   // Here a step tells much. Of a mismatch too large for two laws to explain alike none is followed behind one that leaves nothing.

@@ -66,7 +66,7 @@ FittedExplanation::FittedExplanation(const Explanation& explanation, const Rival
   refuse_idle("the diagnosis", problem_.effects, problem_.rig, problem_.runs);
   const auto model = std::make_shared<const AeroelasticModel>(model_of(problem_.rig, problem_.runs, problem_.circulation, problem_.effects));
   arrival_ = std::make_unique<Arrival>(problem_.effects.empty() ? arrive(problem_, model) : arrive_at_effects(problem_));
-  no_answer_ = describe_fit(*arrival_, problem_, Settle::steps).no_answer;
+  no_answer_ = describe_fit(*arrival_, problem_, Settle::all).no_answer;
 }
 
 double FittedExplanation::log_noise() const {
