@@ -42,8 +42,9 @@ double step_left(const JointProblem& joint) {
   return standing(squares, linearise(squares, squares.values())).step_left;
 }
 
-/// Halves the steps in which nonlinear laws are followed until half of them would move the unknowns by less than a third of a standard error, all together. The error
-/// of a law goes with the square of the step (core/propagate/nonlinear_response.h): three quarters of it show, and at most four ninths of a standard error are left. By that law the next steps are chosen, and then looked at.
+/// Halves the steps in which nonlinear laws are followed until half of them would move the unknowns by less than a third of a standard error, all together. The error of a smooth law goes
+/// with the fourth power of the step (core/propagate/nonlinear_response.h), that of one with kinks with the square: three quarters of it show, and at most four ninths of a standard error are left. By the
+/// square the next steps are chosen, and then looked at.
 void settle_steps(Arrival& arrival) {
   if (!follows_smooth_laws(arrival.joint)) return;
   constexpr Eigen::Index most = 8;

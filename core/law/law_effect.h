@@ -23,7 +23,7 @@ struct LawEffect : Effect {
 ///
 /// A term `factor * a` whose factor stays what it is within a run is a mass: with a = r x' it is solved for exactly, f = factor a_0 / (1 - factor r b), a_0 the acceleration without it, b what a
 /// unit force does to x'. Elsewhere a law sees the acceleration that its own force has part in (core/propagate/feedback_force.h).
-/// A term `factor * z` is linear and stays with the exact step (core/propagate/nonlinear_response.h); the rest runs straight from step to step.
+/// A term `factor * z` is linear and stays with the exact step (core/propagate/nonlinear_response.h); the rest runs as parabolas over the steps.
 std::shared_ptr<const LawEffect> law_effect(Law law);
 
 /// Puts a law to a rig. Throws InputError where the rig has one of the same id.

@@ -144,15 +144,14 @@ MatrixXd response_of(const SimulateProblem& problem, const LinearSystem& system,
   const Motion motion = system.motion >= 0 && !jumps ? interpolated_motion(run.channel("alpha").value, run.dt) : Motion{};
   const MatrixXd input = run_inputs(run, conditions);
   const VectorXd start = start_of(problem, system, motion);
-  const ExactStep step = step_to_follow(system, run.dt);
   if (jumps && problem.signal_steps.size() > 0) throw std::invalid_argument("signals that step, and a shaft that jumps");
-  if (problem.signal_steps.size() > 0) return response_with_steps(problem, system, step, start, motion.jerk, input);
+  if (problem.signal_steps.size() > 0) return response_with_steps(problem, system, step_to_follow(system, run.dt), start, motion.jerk, input);
   if (!system.feedback.empty()) {
-    const NonlinearResponse response = follow(system, step, problem.theta, {start, motion.jerk, input, MatrixXd(system.states(), 0), {}}, run.samples(), Partials::none);
+    const NonlinearResponse response = follow(system, step_to_follow(system, run.dt), problem.theta, {start, motion.jerk, input, MatrixXd(system.states(), 0), {}}, run.samples(), Partials::none);
     if (!response.finite) throw NoAnswer(run.file + ": the response with its nonlinear effects grows beyond all bounds");
     return response.output;
   }
-  MatrixXd output = drive(system, step, DualMatrix(start), run.samples(), motion.jerk, input.cols() > 0 ? input : MatrixXd(), Partials::none).output;
+  MatrixXd output = drive(system, exact_step(system, run.dt), DualMatrix(start), run.samples(), motion.jerk, input.cols() > 0 ? input : MatrixXd(), Partials::none).output;
   if (jumps) output += jump_response(system, run.channel("alpha").value, run.dt);
   return output;
 }

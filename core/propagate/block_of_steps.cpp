@@ -13,20 +13,20 @@ using Eigen::MatrixXd;
 
 Index BlockOfSteps::best_length(const StepMatrices& one) {
   // Least of L/2 changes on what is seen and the states once in L steps.
-  const auto changes = static_cast<double>(one.feedbacks * (one.arguments + one.channels)), states = static_cast<double>(one.states * one.jerk());
+  const auto changes = static_cast<double>(one.forces() * (one.seen() + one.channels)), states = static_cast<double>(one.states * one.jerk());
   return std::max<Index>(1, std::lround(std::sqrt(2 * states / std::max(1.0, changes))));
 }
 
 BlockOfSteps::BlockOfSteps(const StepMatrices& one, Index steps, bool jerks)
-    : steps_(steps), states_(one.states), forces_(one.feedbacks), arguments_(one.arguments), channels_(one.channels), changes_(forces_ + (jerks ? 1 : 0)) {
-  const Index all = states_ + forces_;
+    : steps_(steps), states_(one.states), feedbacks_(one.feedbacks), forces_(one.forces()), seen_(one.seen()), channels_(one.channels), changes_(forces_ + (jerks ? 1 : 0)) {
+  const Index all = carried();
   MatrixXd step = MatrixXd::Zero(all, all), change = MatrixXd::Zero(all, changes_);
   step.topRows(states_) = one.step.topLeftCorner(states_, all);
   change.topLeftCorner(states_, forces_) = one.late.topRows(states_);
-  change.bottomLeftCorner(forces_, forces_).setIdentity();
+  change.block(states_, forces_ - feedbacks_, feedbacks_, feedbacks_).setIdentity();
   if (jerks) {
     change.col(forces_).head(states_) = one.step.col(one.jerk()).head(states_);
-    jerk_at_once_ = one.step.col(one.jerk()).segment(one.argument(), arguments_);
+    jerk_at_once_ = one.step.col(one.jerk()).segment(one.argument(), seen_);
   }
   const MatrixXd sees = one.step.block(one.argument(), 0, per_step(), all);
 
@@ -57,16 +57,16 @@ void BlockOfSteps::begin(Work& work) const {
 void BlockOfSteps::add_changes(Work& work, Index k) const {
   auto seen = work.seen.middleCols(k * per_step(), per_step());
   if (k > 0 && changes_ > 0) {
-    small_product(work.changes.col(states_ + forces_).data(), work.changes.rows(), k * changes_, change_seen_.data() + (steps_ - k) * changes_, change_seen_.rows(), per_step(), work.room.data(), work.room.rows());
+    small_product(work.changes.col(carried()).data(), work.changes.rows(), k * changes_, change_seen_.data() + (steps_ - k) * changes_, change_seen_.rows(), per_step(), work.room.data(), work.room.rows());
     seen += work.room.leftCols(per_step());
   }
-  if (changes_ > forces_) seen.leftCols(arguments_) += jerk(work, k) * jerk_at_once_.transpose();
+  if (changes_ > forces_) seen.leftCols(seen_) += jerk(work, k) * jerk_at_once_.transpose();
 }
 
 void BlockOfSteps::end(Work& work) const {
   small_product(work.changes.data(), work.changes.rows(), all_end_.rows(), all_end_.data(), all_end_.rows(), states_, work.room.data(), work.room.rows());
   work.changes.leftCols(states_) = work.room.leftCols(states_);
-  work.changes.middleCols(states_, forces_) = forces(work, steps_ - 1);
+  work.changes.middleCols(states_, feedbacks_) = forces(work, steps_ - 1).rightCols(feedbacks_);
 }
 
 }  // namespace unrig

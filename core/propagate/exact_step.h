@@ -14,7 +14,8 @@ namespace unrig {
 ///
 ///   u(s) = (1 - s) u_k + s u_{k+1} + dt^2/6 ((1 - s)^3 - (1 - s)) u''_k + dt^2/6 (s^3 - s) u''_{k+1},   s = (t - t_k)/dt in [0, 1]
 ///
-/// whose second derivatives are inputs of their own (LinearSystem::curved). All four are blocks of one matrix exponential, and carry exact partial derivatives.
+/// whose second derivatives are inputs of their own (LinearSystem::curved). `bend` is the response to a law's force that goes as s^2 (core/propagate/step_matrices.h). All are blocks of one
+/// matrix exponential, and carry exact partial derivatives.
 /// Throws std::invalid_argument where there is no room for these.
 struct ExactStep {
   double dt = 0;
@@ -22,6 +23,7 @@ struct ExactStep {
   DualMatrix jerk;        ///< n x 1; empty where the system has no prescribed motion
   DualMatrix input0;      ///< n x m
   DualMatrix input1;      ///< n x m
+  DualMatrix bend;        ///< n x feedbacks
 };
 
 ExactStep exact_step(const LinearSystem& system, double dt);

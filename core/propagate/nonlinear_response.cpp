@@ -21,89 +21,120 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-// How many feedbacks and arguments there are: one of each, a handful of both, so that a step allocates nothing, or any number (a law on each of many strips).
-constexpr int one = 1, handful = Eigen::Dynamic, many = -2;
-constexpr int in_a_handful = 16;
-constexpr int rows_of(int M) { return M == one ? 1 : Eigen::Dynamic; }
-constexpr int most_rows_of(int M) { return M == one ? 1 : M == handful ? in_a_handful : Eigen::Dynamic; }
-template <int M>
-using Few = Eigen::Matrix<double, rows_of(M), 1, 0, most_rows_of(M), 1>;
-template <int M>
-using FewSquare = Eigen::Matrix<double, rows_of(M), rows_of(M), 0, most_rows_of(M), most_rows_of(M)>;
+/// How many forces and arguments a step has, in its middle and at its end together. Known numbers, or known bounds, so that a step allocates nothing.
+template <int forces, int arguments, int most>
+struct Sizes {
+  static constexpr int most_forces = forces == Eigen::Dynamic ? most : forces, most_arguments = arguments == Eigen::Dynamic ? most : arguments;
+  static constexpr bool is_one_law = forces != Eigen::Dynamic;
+  using Forces = Eigen::Matrix<double, forces, 1, 0, most_forces, 1>;
+  using Seen = Eigen::Matrix<double, arguments, 1, 0, most_arguments, 1>;
+  using Slopes = Eigen::Matrix<double, forces, arguments, 0, most_forces, most_arguments>;
+  using Gain = Eigen::Matrix<double, arguments, forces, 0, most_arguments, most_forces>;
+  using Square = Eigen::Matrix<double, forces, forces, 0, most_forces, most_forces>;
+};
+constexpr int in_a_handful = 32;
+using LawOfOne = Sizes<2, 2, 2>;  ///< argument
+using LawOfSeveral = Sizes<2, Eigen::Dynamic, 2 * most_law_arguments>;
+using AHandful = Sizes<Eigen::Dynamic, Eigen::Dynamic, in_a_handful>;
+using Many = Sizes<Eigen::Dynamic, Eigen::Dynamic, Eigen::Dynamic>;  ///< a law on each of many strips
 
-/// The laws of all feedbacks at one sample.
-template <int M>
+/// The laws of all feedbacks at some instants, one behind the other.
+template <class S>
 class Laws {
  public:
-  Laws(const LinearSystem& system, const Arguments& arguments, const VectorXd& theta) : system_(system), arguments_(arguments), theta_(theta) {
-    force = Few<M>::Zero(static_cast<Index>(system.feedback.size()));
-    slope = Few<M>::Zero(arguments.count());
-  }
+  Laws(const LinearSystem& system, const Arguments& arguments, const VectorXd& theta, Index instants)
+      : force(S::Forces::Zero(instants * feedbacks_of(system))), slope(S::Seen::Zero(instants * arguments.count())), system_(system), arguments_(arguments), theta_(theta), instants_(instants) {}
   /// At the arguments z of all feedbacks in turn.
-  void at(const Few<M>& z) {
+  void at(const typename S::Seen& z) {
     constexpr int of_a_law = 50;  // about, with the powers in it
-    count_work(of_a_law * static_cast<std::int64_t>(system_.feedback.size()));
-    for (std::size_t i = 0; i < system_.feedback.size(); ++i) {
-      const Index first = arguments_.first[i], count = system_.feedback[i].sees.rows();
-      const FeedbackForce f = force_of(system_.feedback[i], z.data() + first, theta_);
-      force[static_cast<Index>(i)] = f.value;
-      for (Index a = 0; a < count; ++a) slope[first + a] = f.slope[static_cast<std::size_t>(a)];
-    }
+    count_work(of_a_law * force.size());
+    for (Index k = 0, i = 0; k < instants_; ++k)
+      for (std::size_t law = 0; law < system_.feedback.size(); ++law, ++i) {
+        const Index first = k * arguments_.count() + arguments_.first[law], count = system_.feedback[law].sees.rows();
+        const FeedbackForce f = force_of(system_.feedback[law], z.data() + first, theta_);
+        force[i] = f.value;
+        for (Index a = 0; a < count; ++a) slope[first + a] = f.slope[static_cast<std::size_t>(a)];
+      }
   }
-  /// d force / d theta at z, feedbacks x those parameters that are carried. `place`: of each among these.
-  void partials_at(const Few<M>& z, const std::vector<Index>& place, Eigen::Ref<MatrixXd> partials) const {
+  /// d force / d theta at z, forces x those parameters that are carried. `place`: of each among these.
+  void partials_at(const typename S::Seen& z, const std::vector<Index>& place, Eigen::Ref<MatrixXd> partials) const {
     partials.setZero();
-    for (std::size_t i = 0; i < system_.feedback.size(); ++i) {
-      const Feedback& f = system_.feedback[i];
-      const FeedbackForce at_z = force_of(f, z.data() + arguments_.first[i], theta_);
-      for (Index k = 0; k < f.parameters; ++k) partials(static_cast<Index>(i), place[static_cast<std::size_t>(f.first_parameter + k)]) = at_z.partial[static_cast<std::size_t>(k)];
-    }
+    for (Index k = 0, i = 0; k < instants_; ++k)
+      for (std::size_t law = 0; law < system_.feedback.size(); ++law, ++i) {
+        const Feedback& f = system_.feedback[law];
+        const FeedbackForce at_z = force_of(f, z.data() + k * arguments_.count() + arguments_.first[law], theta_);
+        for (Index p = 0; p < f.parameters; ++p) partials(i, place[static_cast<std::size_t>(f.first_parameter + p)]) = at_z.partial[static_cast<std::size_t>(p)];
+      }
   }
-  Few<M> force;  ///< of each feedback
-  Few<M> slope;  ///< in each argument, of the feedback whose it is
+  /// Slopes as forces x arguments.
+  typename S::Slopes of_each(const typename S::Seen& slopes) const {
+    const Index arguments = arguments_.count(), feedbacks = feedbacks_of(system_);
+    typename S::Slopes own = S::Slopes::Zero(force.size(), slopes.size());
+    for (Index a = 0; a < slopes.size(); ++a) own(a / arguments * feedbacks + arguments_.owner[static_cast<std::size_t>(a % arguments)], a) = slopes[a];
+    return own;
+  }
+  typename S::Forces force;  ///< of each feedback
+  typename S::Seen slope;    ///< in each argument, of the feedback whose it is
 
  private:
+  static Index feedbacks_of(const LinearSystem& system) { return static_cast<Index>(system.feedback.size()); }
+
   const LinearSystem& system_;
   const Arguments& arguments_;
   const VectorXd& theta_;
+  Index instants_;
 };
 
-/// z with z = known + gain f(z): Newton's method with the inverse of an earlier step as long as that takes the residual down, halved where it does not fall. `by_argument`: the
-/// column of `gain` for each argument's feedback. `inverse`: of 1 - by_argument slope.
-template <int M>
-Few<M> implicit_argument(Laws<M>& laws, const Few<M>& known, const FewSquare<M>& gain, const FewSquare<M>& by_argument, Few<M> z, FewSquare<M>& inverse) {
+template <class Square>
+Square inverse_of(const Square& m) {
+  if constexpr (Square::RowsAtCompileTime == Eigen::Dynamic) return m.partialPivLu().inverse();
+  return m.inverse();
+}
+
+/// z = known + gain f with f = laws(z), from f = `start`; leaves f in laws.force. Newton's method, halved where the residual does not fall. Several laws
+/// keep the inverse of an earlier step as long as that takes the residual down. `inverse`: of 1 - slope gain.
+template <class S>
+typename S::Seen solve_forces(Laws<S>& laws, const typename S::Seen& known, const typename S::Gain& gain, const typename S::Forces& start, typename S::Square& inverse) {
   constexpr int most = 60;
   constexpr double quickly = 0.1;
-  const Index m = z.size();
-  const auto residual_of = [&](const Few<M>& at) -> Few<M> {
-    laws.at(at);
-    return at - known - gain.lazyProduct(laws.force);
+  typename S::Forces force = start, left;
+  typename S::Seen z;
+  const auto missed_at = [&](const typename S::Forces& f) {
+    z = known + gain.lazyProduct(f);
+    laws.at(z);
+    left = laws.force - f;
+    return gain.lazyProduct(left).norm();
   };
-  Few<M> residual = residual_of(z);
+  double missed = missed_at(force);
   for (int i = 0; i < most; ++i) {
-    const double size = residual.norm(), scale = 1e-13 * (known.norm() + z.norm()) + 1e-300;
-    if (!(size > scale)) return z;
-    Few<M> next, after;
-    const auto go = [&](double fraction) {
-      next = z - fraction * inverse.lazyProduct(residual);
-      after = residual_of(next);
+    const double rounding = 1e-13 * (known.norm() + z.norm()) + 1e-300;
+    if (!(missed > rounding)) return z;
+    const typename S::Forces from = force, residual = left;
+    double after = INFINITY;
+    const auto go = [&](double share) {
+      force = from + share * inverse.lazyProduct(residual);
+      after = missed_at(force);
     };
-    bool fell = false;
-    if constexpr (M == one) {
-      inverse(0, 0) = 1 / (1 - by_argument(0, 0) * laws.slope[0]);
-    } else {
-      const Few<M> slope = laws.slope;
+    const auto invert = [&] { inverse = inverse_of<typename S::Square>(S::Square::Identity(force.size(), force.size()) - laws.of_each(laws.slope).lazyProduct(gain)); };
+    if constexpr (S::is_one_law) {
+      invert();
       go(1);
-      fell = after.norm() < quickly * size;
-      if (!fell) inverse = (FewSquare<M>::Identity(m, m) - by_argument * slope.asDiagonal()).partialPivLu().inverse();
+    } else {
+      const typename S::Seen slope = laws.slope;
+      go(1);
+      if (!(after < quickly * missed)) {
+        laws.slope = slope;
+        invert();
+        go(1);
+      }
     }
-    if (!fell) go(1);
-    for (double fraction = 0.5; !(after.norm() < size) && fraction > 1e-4; fraction /= 2) go(fraction);
-    if (!(after.norm() < size)) break;  // stuck
-    z = next;
-    residual = after;
+    for (double share = 0.5; !(after < missed) && share > 1e-4; share /= 2) go(share);
+    if (!(after < missed)) {  // stuck
+      missed_at(from);
+      return z;
+    }
+    missed = after;
   }
-  laws.at(z);
   return z;
 }
 
@@ -113,23 +144,24 @@ Index steps_per_sample(const LinearSystem& system) {
   return most;
 }
 
-template <int M>
+template <class S>
 class Follower {
  public:
-  Follower(const LinearSystem& system, const ExactStep& exact, const VectorXd& theta, const NonlinearDrive& drive, Index samples, Partials partials)
+  Follower(const LinearSystem& system, const ExactStep& half, const VectorXd& theta, const NonlinearDrive& drive, Index samples, Partials partials)
       : system_(system),
         drive_(drive),
-        dt_(exact.dt),
+        theta_(theta),
+        dt_(2 * half.dt),
         per_sample_(steps_per_sample(system)),
         samples_(samples),
         steps_(samples * per_sample_),
         arguments_(system),
-        laws_(system, arguments_, theta),
-        one_(system, exact, arguments_, partials == Partials::all ? system.A.parameters() : 0),
+        laws_(system, arguments_, theta, StepMatrices::nodes),
+        one_(system, half, arguments_, partials == Partials::all ? system.A.parameters() : 0),
         directions_(drive.start_tangent.cols()),
         carried_(parameters_that_act(system)),
-        gain_(one_.late.middleRows(one_.argument(), one_.arguments)),
-        by_argument_(gain_(Eigen::all, arguments_.owner)) {
+        gain_(one_.late.middleRows(one_.argument(), one_.seen())),
+        inverse_(S::Square::Identity(one_.forces(), one_.forces())) {
     place_.assign(static_cast<std::size_t>(one_.parameters), -1);
     for (std::size_t a = 0; a < carried_.size(); ++a) place_[static_cast<std::size_t>(carried_[a])] = static_cast<Index>(a);
   }
@@ -142,7 +174,6 @@ class Follower {
       if (directions_ > 0 && response_.finite) carry_directions(first, count);
       if (carried() > 0 && response_.finite) carry_parameters(first, count);
       now_.col(0) = now_.col(count);
-      slope_.col(0) = slope_.col(count);
     }
     response_.largest_argument = largest_;
     response_.end = now_.col(0).head(one_.states);
@@ -174,40 +205,40 @@ class Follower {
   Index column(Index a) const { return directions_ + carried_[static_cast<std::size_t>(a)]; }
 
   void begin() {
-    const Index n = one_.states, m = one_.feedbacks, block = std::min(most_at_a_time, steps_);
+    const Index block = std::min(most_at_a_time, steps_);
     response_.output.resize(samples_, one_.channels);
     const Index columns = directions_ + one_.parameters;
     response_.tangent.assign(static_cast<std::size_t>(columns > 0 ? one_.channels : 0), MatrixXd::Zero(samples_, columns));
-    now_ = MatrixXd::Zero(one_.inputs() + m, block + 1);
-    slope_ = MatrixXd::Zero(one_.arguments, block + 1);
+    now_ = MatrixXd::Zero(one_.inputs() + one_.forces(), block + 1);
+    slope_ = MatrixXd::Zero(one_.seen(), block);
     stepped_ = VectorXd::Zero(one_.rows());
+    law_partial_ = MatrixXd::Zero(one_.forces(), carried() * block);
+    largest_ = VectorXd::Zero(one_.feedbacks);
+    now_.col(0).head(one_.states) = drive_.start;
     start_laws();
-    now_.col(0).head(n) = drive_.start;
-    now_.col(0).segment(one_.force(), m) = laws_.force;
-    slope_.col(0) = laws_.slope;
-    law_partial_ = MatrixXd::Zero(m, carried() * (block + 1));
-    if (carried() > 0) laws_.partials_at(z_, place_, law_partials(0));
-    largest_ = VectorXd::Zero(m);
-    start_tangents();
   }
 
   /// The forces where the stretch begins, which the laws may see in the accelerations.
   void start_laws() {
-    inverse_ = FewSquare<M>::Identity(one_.arguments, one_.arguments);
-    const MatrixXd of_forces = arguments_.sees_input.value.rightCols(one_.feedbacks);
+    const Index m = one_.feedbacks;
+    Laws<Many> laws(system_, arguments_, theta_, 1);
+    const MatrixXd of_forces = arguments_.sees_input.value.rightCols(m);
     VectorXd known = arguments_.sees.value * drive_.start;
     if (one_.measured > 0) known += arguments_.sees_input.value.leftCols(one_.measured) * drive_.input.row(0).transpose();
-    z_ = known;
-    laws_.at(z_);
-    if (arguments_.accelerations) z_ = implicit_argument<M>(laws_, known, of_forces, of_forces(Eigen::all, arguments_.owner), z_, inverse_);
+    MatrixXd inverse = MatrixXd::Identity(m, m);
+    const VectorXd z = solve_forces<Many>(laws, known, of_forces, VectorXd::Zero(m), inverse);
+    now_.col(0).segment(one_.force(), m) = laws.force;
+    MatrixXd partials(m, carried());
+    if (carried() > 0) laws.partials_at(z, place_, partials);
+    start_tangents(laws, partials);
   }
 
-  void start_tangents() {
+  void start_tangents(const Laws<Many>& laws, const MatrixXd& partials) {
     const Index n = one_.states, m = one_.feedbacks, p = carried();
     MatrixXd start = MatrixXd::Zero(n, directions_ + p);
     if (directions_ > 0) start.leftCols(directions_) = drive_.start_tangent;
     if (p > 0 && drive_.start_partial.size() > 0) start.rightCols(p) = drive_.start_partial(Eigen::all, carried_);
-    const MatrixXd force = force_tangents(start);
+    const MatrixXd force = force_tangents(start, laws, partials);
     tangent_.resize(n + m, p);
     tangent_ << start.rightCols(p), force.rightCols(p);
     next_.resize(one_.rows(), p);
@@ -220,15 +251,15 @@ class Follower {
   }
 
   /// Of the forces where the stretch begins: df = slope dz + partial, dz = sees dx + dsees x + the same of inputs and forces.
-  MatrixXd force_tangents(const MatrixXd& state) {
+  MatrixXd force_tangents(const MatrixXd& state, const Laws<Many>& laws, const MatrixXd& partials) {
     const Index m = one_.feedbacks;
     MatrixXd seen = arguments_.sees.value * state, partial = MatrixXd::Zero(m, state.cols());
-    partial.rightCols(carried()) = law_partials(0);
-    const auto own = of_each<MatrixXd>(slope_.col(0));
+    partial.rightCols(carried()) = partials;
+    const MatrixXd own = laws.of_each(laws.slope);
     if (!arguments_.accelerations) return own * seen + partial;
     VectorXd inputs(one_.measured + m);
     if (one_.measured > 0) inputs.head(one_.measured) = drive_.input.row(0).transpose();
-    inputs.tail(m) = laws_.force;
+    inputs.tail(m) = laws.force;
     for (Index a = 0; a < carried(); ++a) {
       const Index j = carried_[static_cast<std::size_t>(a)];
       if (arguments_.sees.depends_on(j)) seen.col(directions_ + a) += arguments_.sees.d(j) * drive_.start;
@@ -240,7 +271,7 @@ class Follower {
 
   auto law_partials(Index k) { return law_partial_.middleCols(k * carried(), carried()); }
 
-  /// The response itself; leaves v and the force at the end of every step in now_, the laws' slopes in slope_.
+  /// The response itself; leaves v and the forces in the middle and at the end of every step in now_, the laws' slopes in slope_.
   void march(Index first, Index count) {
     const Index n = one_.states, m = one_.feedbacks, q = one_.measured;
     for (Index k = 0; k < count; ++k) {
@@ -253,16 +284,20 @@ class Follower {
       }
       small_product(one_.step.data(), one_.rows(), one_.inputs(), v.data(), 0, 1, stepped_.data(), 0);
       if (part == 0) response_.output.row(sample) = stepped_.segment(one_.output(), one_.channels).transpose();
-      z_ = implicit_argument<M>(laws_, stepped_.segment(one_.argument(), one_.arguments), gain_, by_argument_, z_, inverse_);
+      typename S::Forces held(one_.forces());
+      held << v.segment(one_.force(), m), v.segment(one_.force(), m);
+      const typename S::Seen z = solve_forces<S>(laws_, stepped_.segment(one_.argument(), one_.seen()), gain_, held, inverse_);
       next.head(n) = stepped_.head(n);
-      for (Index i = 0; i < m; ++i) {
-        const double force = laws_.force[i], z = z_[arguments_.first[static_cast<std::size_t>(i)]];
-        next.head(n) += force * one_.late.col(i).head(n);
-        next[one_.force() + i] = v[one_.inputs() + i] = force;
-        largest_[i] = std::max(largest_[i], std::abs(z));
+      for (Index i = 0; i < one_.forces(); ++i) {
+        next.head(n) += laws_.force[i] * one_.late.col(i).head(n);
+        v[one_.inputs() + i] = laws_.force[i];
       }
-      slope_.col(k + 1) = laws_.slope;
-      if (carried() > 0) laws_.partials_at(z_, place_, law_partials(k + 1));
+      for (Index i = 0; i < m; ++i) {
+        next[one_.force() + i] = laws_.force[m + i];
+        largest_[i] = std::max(largest_[i], std::abs(z[one_.arguments + arguments_.first[static_cast<std::size_t>(i)]]));
+      }
+      slope_.col(k) = laws_.slope;
+      if (carried() > 0) laws_.partials_at(z, place_, law_partials(k));
       if (!next.head(n).allFinite()) {
         response_.finite = false;
         return;
@@ -285,7 +320,7 @@ class Follower {
       for (Index k = 0; k < block.steps(); ++k) {
         if (drive_.jerk_tangent.size() > 0) block.jerk(work_, k).head(directions_) = drive_.jerk_tangent.row((first + done + k) / per_sample_);
         block.add_changes(work_, k);
-        block.forces(work_, k) = work_.seen.middleCols(k * block.per_step(), one_.arguments).lazyProduct(answer_to(slope_.col(done + k + 1)).transpose());
+        block.forces(work_, k) = work_.seen.middleCols(k * block.per_step(), one_.seen()).lazyProduct(answer_to(slope_.col(done + k)).transpose());
       }
       read_directions(block, first + done);
       block.end(work_);
@@ -305,7 +340,7 @@ class Follower {
     if (skipped >= block.steps()) return;
     const Index reads = (block.steps() - skipped - 1) / per_sample_ + 1, rows = work_.seen.rows();
     for (Index c = 0; c < one_.channels; ++c) {
-      const Eigen::Map<const MatrixXd, 0, Eigen::OuterStride<>> seen(work_.seen.col(skipped * block.per_step() + one_.arguments + c).data(), directions_, reads, Eigen::OuterStride<>(per_sample_ * block.per_step() * rows));
+      const Eigen::Map<const MatrixXd, 0, Eigen::OuterStride<>> seen(work_.seen.col(skipped * block.per_step() + one_.seen() + c).data(), directions_, reads, Eigen::OuterStride<>(per_sample_ * block.per_step() * rows));
       response_.tangent[static_cast<std::size_t>(c)].block(sample, 0, reads, directions_) = seen.transpose();
     }
   }
@@ -322,55 +357,44 @@ class Follower {
       if ((first + k) % per_sample_ == 0)
         for (Index c = 0; c < one_.channels; ++c)
           for (Index a = 0; a < p; ++a) response_.tangent[static_cast<std::size_t>(c)]((first + k) / per_sample_, column(a)) = next_(one_.output() + c, a);
-      next_ += one_.late.lazyProduct(law_partials(k + 1));
-      const FewSquare<M> answer = answer_to(slope_.col(k + 1));
+      next_ += one_.late.lazyProduct(law_partials(k));
+      const typename S::Slopes answer = answer_to(slope_.col(k));
       for (Index j = 0; j < p; ++j) {
-        const Few<M> force = answer.lazyProduct(next_.col(j).segment(one_.argument(), one_.arguments));
-        for (Index i = 0; i < m; ++i) next_.col(j).head(n) += force[i] * one_.late.col(i).head(n);
+        const typename S::Forces force = answer.lazyProduct(next_.col(j).segment(one_.argument(), one_.seen()));
+        for (Index i = 0; i < one_.forces(); ++i) next_.col(j).head(n) += force[i] * one_.late.col(i).head(n);
         tangent_.col(j).head(n) = next_.col(j).head(n);
-        tangent_.col(j).tail(m) = force + law_partials(k + 1).col(j);
+        tangent_.col(j).tail(m) = force.tail(m) + law_partials(k).col(j).tail(m);
       }
     }
   }
 
-  /// How the forces at the end of a step, feedbacks x arguments, answer to what the laws see there without them: df = slope (dz + gain df).
-  FewSquare<M> answer_to(const Few<M>& slope) const {
-    if constexpr (M == one) {
-      return slope / (1 - slope[0] * gain_(0, 0));
-    } else {
-      const auto own = of_each<FewSquare<M>>(slope);
-      return (FewSquare<M>::Identity(own.rows(), own.rows()) - own.lazyProduct(gain_)).partialPivLu().solve(own);
-    }
-  }
-
-  /// The slopes as feedbacks x arguments.
-  template <typename Matrix>
-  Matrix of_each(const Few<M>& slope) const {
-    Matrix own = Matrix::Zero(one_.feedbacks, one_.arguments);
-    for (Index a = 0; a < slope.size(); ++a) own(arguments_.owner[static_cast<std::size_t>(a)], a) = slope[a];
-    return own;
+  /// How the forces of a step, in its middle and at its end, answer to what the laws see there without them, forces x arguments: df = slope (dz + gain df).
+  typename S::Slopes answer_to(const typename S::Seen& slope) const {
+    const typename S::Slopes own = laws_.of_each(slope);
+    const typename S::Square left = S::Square::Identity(own.rows(), own.rows()) - own.lazyProduct(gain_);
+    if constexpr (S::is_one_law) return left.inverse() * own;
+    return left.partialPivLu().solve(own);
   }
 
   const LinearSystem& system_;
   const NonlinearDrive& drive_;
+  const VectorXd& theta_;
   double dt_;  // of a step
   Index per_sample_, samples_, steps_;
   Arguments arguments_;
-  Laws<M> laws_;
+  Laws<S> laws_;
   StepMatrices one_;
   Index directions_;
   std::vector<Index> carried_, place_;  // parameters whose tangents are carried, and of each parameter where among them
-  FewSquare<M> gain_;         // arguments x feedbacks: how the force at the end of a step moves what the laws see there
-  FewSquare<M> by_argument_;  // the same for each argument's feedback
-  FewSquare<M> inverse_;      // of 1 - by_argument_ slope, at a step before
+  typename S::Gain gain_;       // arguments x forces: how the forces in the middle and at the end of a step move what the laws see there
+  typename S::Square inverse_;  // of 1 - slope gain_, at a step before
   NonlinearResponse response_;
-  MatrixXd now_;  // of each step v, and f at its end
+  MatrixXd now_;  // of each step v, and its forces in the middle and at the end
   MatrixXd slope_, law_partial_, source_;
   MatrixXd tangent_, next_;  // of [x; f] in the carried parameters, and the rows of a step
   std::optional<BlockOfSteps> block_, last_block_;
   BlockOfSteps::Work work_;
   VectorXd stepped_, largest_;
-  Few<M> z_;
 };
 
 }  // namespace
@@ -390,16 +414,17 @@ LinearSystem under_one_input(LinearSystem system, Index input) {
   return system;
 }
 
-ExactStep step_to_follow(const LinearSystem& system, double dt) { return exact_step(system, dt / static_cast<double>(steps_per_sample(system))); }
+ExactStep step_to_follow(const LinearSystem& system, double dt) { return exact_step(system, dt / static_cast<double>(2 * steps_per_sample(system))); }
 
-NonlinearResponse follow(const LinearSystem& system, const ExactStep& step, const VectorXd& theta, const NonlinearDrive& drive, Index samples, Partials partials) {
+NonlinearResponse follow(const LinearSystem& system, const ExactStep& half, const VectorXd& theta, const NonlinearDrive& drive, Index samples, Partials partials) {
   Index arguments = 0;
   for (const Feedback& f : system.feedback) arguments += f.sees.rows();
   const auto feedbacks = static_cast<Index>(system.feedback.size());
   if (const Index measured = system.B.cols() - feedbacks; drive.input.cols() != measured) throw std::invalid_argument(fmt::format("a system of {} measured inputs cannot be driven by {}", measured, drive.input.cols()));
-  if (feedbacks == 1 && arguments == 1) return Follower<one>(system, step, theta, drive, samples, partials).run();
-  if (std::max(feedbacks, arguments) <= in_a_handful) return Follower<handful>(system, step, theta, drive, samples, partials).run();
-  return Follower<many>(system, step, theta, drive, samples, partials).run();
+  if (feedbacks == 1 && arguments == 1) return Follower<LawOfOne>(system, half, theta, drive, samples, partials).run();
+  if (feedbacks == 1) return Follower<LawOfSeveral>(system, half, theta, drive, samples, partials).run();
+  if (StepMatrices::nodes * std::max(feedbacks, arguments) <= in_a_handful) return Follower<AHandful>(system, half, theta, drive, samples, partials).run();
+  return Follower<Many>(system, half, theta, drive, samples, partials).run();
 }
 
 }  // namespace unrig

@@ -33,13 +33,14 @@ LinearSystem linear_part(LinearSystem system);
 /// The system without partials and laws under one of its inputs alone, which runs straight between samples.
 LinearSystem under_one_input(LinearSystem system, Eigen::Index input);
 
-/// The step that `follow` takes: a sample, or as small a part of it as the most demanding of the system's feedbacks wants.
+/// Half the step that `follow` takes: of a sample, or of as small a part of it as the most demanding of the system's feedbacks wants.
 ExactStep step_to_follow(const LinearSystem& system, double dt);
 
-/// Follows x' = A x + J jerk + B [u; f(S x)] in equal steps (step_to_follow). The linear part is exact; the nonlinear forces run straight from step to step
-/// (first-order hold), so that a force of angular frequency w is off by (w dt)^2/12 of itself, dt the step. The force at the end of a step is solved for together with the state, so
-/// that stiff and dissipative laws stay stable. Throws std::invalid_argument where the system has another number of measured inputs. Tangents are exact derivatives of this recursion: K directions, and the partials in theta where asked.
-NonlinearResponse follow(const LinearSystem& system, const ExactStep& step, const Eigen::VectorXd& theta, const NonlinearDrive& drive, Eigen::Index samples,
+/// Follows x' = A x + J jerk + B [u; f(S x)] in equal steps, `half` of each by step_to_follow. The linear part is exact. The nonlinear forces run as parabolas through the beginning, the middle
+/// and the end of each step, so that a smooth force of angular frequency w is off by (w dt)^4/720 of itself, dt the step (Hairer and Wanner 1996, IV.5, Lobatto IIIA). The forces in the
+/// middle and at the end are solved for together with the state, so that stiff and dissipative laws stay stable. Throws std::invalid_argument where the system has another number of
+/// measured inputs. Tangents are exact derivatives of this recursion: K directions, and the partials in theta where asked.
+NonlinearResponse follow(const LinearSystem& system, const ExactStep& half, const Eigen::VectorXd& theta, const NonlinearDrive& drive, Eigen::Index samples,
                          Partials partials);
 
 }  // namespace unrig

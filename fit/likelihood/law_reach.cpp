@@ -22,9 +22,8 @@ MatrixXd outputs_of(const RunResidual& run, const RunResidual::Prediction& found
     if (run.free_states()[i] < start.size()) start[run.free_states()[i]] = found.initial_state[static_cast<Index>(i)];
   const MatrixXd input = run_inputs(run.run(), run.conditions());
   for (Feedback& f : system.feedback) f.steps_per_sample *= run.finer();
-  const ExactStep step = step_to_follow(system, run.run().dt);
-  if (system.feedback.empty()) return drive(system, step, DualMatrix(start), samples, found.motion.jerk, input.cols() > 0 ? input : MatrixXd(), Partials::none).output;
-  return follow(system, step, theta, {start, found.motion.jerk, input, MatrixXd(system.states(), 0), {}}, samples, Partials::none).output;
+  if (system.feedback.empty()) return drive(system, exact_step(system, run.run().dt), DualMatrix(start), samples, found.motion.jerk, input.cols() > 0 ? input : MatrixXd(), Partials::none).output;
+  return follow(system, step_to_follow(system, run.run().dt), theta, {start, found.motion.jerk, input, MatrixXd(system.states(), 0), {}}, samples, Partials::none).output;
 }
 
 }  // namespace

@@ -60,7 +60,7 @@ std::shared_ptr<RunResidual::Linearised> RunResidual::linearise(const VectorXd& 
   } else {
     lin->system = searched_system(theta);
     for (DualMatrix* m : {&lin->system.A, &lin->system.B, &lin->system.C, &lin->system.D}) m->partial.clear();
-    lin->step = step_to_follow(lin->system, run_->dt);
+    lin->step = lin->system.feedback.empty() ? exact_step(lin->system, run_->dt) : step_to_follow(lin->system, run_->dt);
     filter_output(lin->system, lin->step);
     lin->wandering = Linearised::wander(*this, theta, lin->system, lin->step, Partials::none);
   }

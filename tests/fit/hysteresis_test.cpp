@@ -96,7 +96,6 @@ TEST_P(Hysteresis, IsFittedByName) {
   problem.effects = {"bouc-wen"};
   const FitResult result = fit(problem);
   EXPECT_TRUE(result.converged) << result.message;
-  // The force on the memory runs straight between samples, which leaves something of the noise's size at the kinks.
   EXPECT_LT(result.runs[0].channels[0].rms_residual, 1.1 * noise);
   const auto near = [&](const std::string& name, double value) {
     const FittedParameter& p = parameter(result, name);
