@@ -43,8 +43,8 @@ double step_left(const JointProblem& joint) {
 }
 
 /// Halves the steps in which nonlinear laws are followed until half of them would move the unknowns by less than a third of a standard error, all together. The error of a smooth law goes
-/// with the fourth power of the step (core/propagate/nonlinear_response.h), that of one with kinks with the square: three quarters of it show, and at most four ninths of a standard error are left. By the
-/// square the next steps are chosen, and then looked at.
+/// with the fourth power of the step (core/propagate/nonlinear_response.h), by which the next steps are chosen, that of one with kinks with the square: three quarters of it show, and at most
+/// four ninths of a standard error are left.
 void settle_steps(Arrival& arrival) {
   if (!follows_smooth_laws(arrival.joint)) return;
   constexpr Eigen::Index most = 8;
@@ -58,7 +58,7 @@ void settle_steps(Arrival& arrival) {
     if (left < hardly) return follow_in(times);
     do {
       times *= 2;
-      left /= 4;
+      left /= 16;
     } while (left >= hardly && times < most);
     follow_in(times);
     solve(arrival);

@@ -445,13 +445,10 @@ void follow_further(Trial& trial, double least, const Goal& goal) {
 bool follow_nonlinear(const FitProblem& problem, Trial& trial, const Trial& base, double least, const Goal& goal) {
   if (all_driven(trial.arrival.joint)) {
     Trial guessed = trial;
-    fit_from_first_guesses(problem, guessed);
-    if (guessed.excess() < half_of_it * base.excess()) {
-      trial = std::move(guessed);
-      return true;
-    }
     if (fit_decays_first(trial, base, true)) fit_fully(trial, 2);
-    if (!(trial.excess() < guessed.excess())) trial = std::move(guessed);
+    if (leaves_nothing(trial)) return true;
+    fit_from_first_guesses(problem, guessed);
+    if (guessed.excess() < trial.excess()) trial = std::move(guessed);
     return true;
   }
   trial.ruled_out = !fit_decays_first(trial, base);
@@ -477,7 +474,7 @@ Arrival arrive_at_effects(const FitProblem& problem) {
   }
   if (leaves_nothing(best) || decays_decide(best)) return best.arrival;
   if (nonlinear(best)) {
-    fit_from_first_guesses(problem, best);
+    if (!all_driven(best.arrival.joint)) fit_from_first_guesses(problem, best);  // there it has been done
     return best.arrival;
   }
   Trial anew{best.effects, arrive_with_effects(problem, best.arrival)};

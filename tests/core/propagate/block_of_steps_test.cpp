@@ -40,6 +40,7 @@ struct Stepped {
     step.jerk = DualMatrix(any(n, 1));
     step.input0 = DualMatrix(any(n, laws));
     step.input1 = DualMatrix(any(n, laws));
+    step.bend = DualMatrix(any(n, laws));
     return {system, step, Arguments(system), 0};
   }
 };
@@ -61,7 +62,7 @@ TEST_P(BlockOfStepsWithLaws, IsTheRecursionOfItsSteps) {
       work.changes.block(0, one.states, directions, one.feedbacks) = f.transpose();
       block.begin(work);
       for (Index k = 0; k < steps; ++k) {
-        const MatrixXd after = stepped.any(one.feedbacks, directions), jerk = jerks ? stepped.any(1, directions) : MatrixXd::Zero(1, directions);
+        const MatrixXd after = stepped.any(one.forces(), directions), jerk = jerks ? stepped.any(1, directions) : MatrixXd::Zero(1, directions);
         if (jerks) block.jerk(work, k).head(directions) = jerk.transpose();
         block.add_changes(work, k);
         block.forces(work, k).topRows(directions) = after.transpose();
@@ -69,7 +70,7 @@ TEST_P(BlockOfStepsWithLaws, IsTheRecursionOfItsSteps) {
         const MatrixXd seen = work.seen.block(0, k * block.per_step(), directions, block.per_step()).transpose();
         EXPECT_LT((seen - all.middleRows(one.argument(), block.per_step())).norm(), 1e-12 * all.norm()) << steps << " steps, step " << k;
         x = all.topRows(one.states) + one.late.topRows(one.states) * after;
-        f = after;
+        f = after.bottomRows(one.feedbacks);
       }
       block.end(work);
       EXPECT_LT((work.changes.topLeftCorner(directions, one.states).transpose() - x).norm(), 1e-12 * x.norm()) << steps << " steps";

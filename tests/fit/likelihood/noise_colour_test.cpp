@@ -90,7 +90,7 @@ TEST_P(WhiteningFilterOf, SaysWhatTheWholeCovarianceSays) {
   LinearSystem system;  // one state that is read and does nothing
   system.A = system.B = system.C = system.D = DualMatrix(MatrixXd::Zero(1, 1));
   system.B = DualMatrix(MatrixXd(1, 0)), system.D = DualMatrix(MatrixXd(1, 0));
-  ExactStep step{dt, DualMatrix(MatrixXd::Zero(1, 1)), {}, DualMatrix(MatrixXd(1, 0)), DualMatrix(MatrixXd(1, 0))};
+  ExactStep step{dt, DualMatrix(MatrixXd::Zero(1, 1)), {}, DualMatrix(MatrixXd(1, 0)), DualMatrix(MatrixXd(1, 0)), {}};
   filter.append(0, system, step);
   const MatrixXd from_start = free_response_rows(system, step, n).front().rightCols(filter.states());
   for (const unsigned seed : {1u, 2u, 3u}) {
