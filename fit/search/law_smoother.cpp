@@ -54,7 +54,8 @@ void LawSmoother::prepare(const VectorXd& theta) {
   gamma0_ = exact_.input0.value.rightCols(laws_);
   gamma1_ = exact_.input1.value.rightCols(laws_);
   if (disturb_.size() == 0) {  // kept: a theta that makes a law stronger must not make its error cheaper
-    const MatrixXd by_laws = (gamma0_ + gamma1_)(Eigen::all, laws_that_show());
+    show_ = laws_that_show();
+    const MatrixXd by_laws = (gamma0_ + gamma1_)(Eigen::all, show_);
     disturbances_ = by_laws.cols() + system_.coordinates;
     disturb_.resize(states_, disturbances_);
     disturb_ << by_laws, exact_.dt * MatrixXd::Identity(states_, states_).middleCols(system_.coordinates, system_.coordinates);
@@ -238,12 +239,19 @@ void LawSmoother::write_reading(Index k, Index channel, Eigen::Ref<RowVectorXd> 
   row[row.size() - 1] = w * (measured_(k, channel) - known);
 }
 
+/// What the channels read of the disturbances of a sample at once, channels x disturbances: of the laws' errors what they read of the laws.
+MatrixXd LawSmoother::read_disturbances() const {
+  MatrixXd reads = MatrixXd::Zero(channels_, disturbances_);
+  reads.leftCols(static_cast<Index>(show_.size())) = system_.D.value.rightCols(laws_)(Eigen::all, show_);
+  return reads;
+}
+
 LawSmoother::Information LawSmoother::information(const VectorXd& theta, const VectorXd& sigma) {
   prepare(theta);
   look_at_laws(theta);
   constexpr Index stack = 32;  // samples whose readings are put together before they are triangularised
   const Index steps = samples_ - 1, n = states_, u = disturbances_, all = n + changes_ + channels_;
-  const MatrixXd moved = moved_by_theta();
+  const MatrixXd moved = moved_by_theta(), at_once = read_disturbances();
   ahead_.resize(static_cast<std::size_t>(steps));
   best_disturbance_.resize(static_cast<std::size_t>(steps));
   // What all later samples say: of the state behind the step over [x | change | offsets | right], and of [change | offsets | right] beside any state.
@@ -271,6 +279,7 @@ LawSmoother::Information LawSmoother::information(const VectorXd& theta, const V
         row.setZero();
         write_reading(k, c, row);
         rows.row(n + u + c).tail(all + 1) = row;
+        if (k < steps) rows.row(n + u + c).head(u) = weight_(k, c) * at_once.row(c);
       }
     triangularise(rows, u + n);
     if (k < steps) best_disturbance_[static_cast<std::size_t>(k)] = rows.topRows(u);
@@ -328,6 +337,7 @@ double LawSmoother::cost(const VectorXd& sigma) const {
   const Index given = system_.B.cols() - laws_;
   MatrixXd left = measured_ - (system_.C.value * state_ + system_.D.value.rightCols(laws_) * force_).transpose();
   if (given > 0) left -= inputs_.topRows(samples_) * system_.D.value.leftCols(given).transpose();
+  left.topRows(samples_ - 1) -= (read_disturbances() * disturbance_).transpose();
   left.rowwise() -= offset_.transpose();
   return left.cwiseProduct(weight_).squaredNorm() + (sigma.cwiseInverse().asDiagonal() * disturbance_).squaredNorm();
 }

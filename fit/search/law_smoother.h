@@ -11,7 +11,7 @@ namespace unrig {
 
 /// The trajectory of a free decay under nonlinear laws that are trusted only so far:
 ///
-///   x_{k+1} = Phi x_k + Gamma0 f(z_k) + Gamma1 f(z_{k+1}) + G w_k + inputs,   y_k = C x_k + D f(z_k) + offset + noise
+///   x_{k+1} = Phi x_k + Gamma0 f(z_k) + Gamma1 f(z_{k+1}) + G w_k + inputs,   y_k = C x_k + D (f(z_k) + w_k) + offset + noise
 ///
 /// with the least J = sum (noise / its sigma)^2 + sum (w / sigma)^2 over the first state, all w_k, the offsets and theta. The disturbances w_k are an error of every
 /// law that the channels show by itself (not of a clock, nor of a memory that only another law looks at) and an unknown acceleration of every coordinate, constant over a step: a sample, or a part of it where a law asks for small steps. The laws see the trajectory that the data ask for instead of one that was
@@ -60,6 +60,7 @@ class LawSmoother {
   Eigen::MatrixXd moved_by_theta() const;
   void write_step(Eigen::Index k, const Eigen::Ref<const Eigen::MatrixXd>& moved);
   void write_reading(Eigen::Index k, Eigen::Index channel, Eigen::Ref<Eigen::RowVectorXd> row) const;
+  Eigen::MatrixXd read_disturbances() const;
   void answer_at(Eigen::Index k, const Eigen::VectorXd& theta);
   auto law_partials(Eigen::Index k) const { return law_partial_.middleCols(k * changes_, changes_); }
   auto answer(Eigen::Index k) const { return answer_.middleCols(k * arguments_.count(), arguments_.count()); }
@@ -73,6 +74,7 @@ class LawSmoother {
   Eigen::Index readings_ = 0, parts_ = 1, samples_ = 0, channels_ = 0, changes_ = 0, states_ = 0, laws_ = 0, disturbances_ = 0;
   Eigen::MatrixXd gamma0_, gamma1_, disturb_;
   Arguments arguments_;
+  std::vector<Eigen::Index> show_;  ///< the laws whose error the first disturbances are
 
   bool followed_ = false;
   Eigen::MatrixXd state_, disturbance_;         ///< n x samples, disturbances x (samples - 1)

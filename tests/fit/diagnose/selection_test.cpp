@@ -219,8 +219,8 @@ TEST(Selection, WhatIsLeftOfALawIsGivenNoNameThatDoesNotExplainIt) {
   EXPECT_THAT(found_in(d), UnorderedElementsAre("coulomb-friction"));
 }
 
-/// Friction of 1.5 N that changes its sign within 0.16 mm/s: followed in whole samples it leaves 1.27 and 1.13 times the noise of the two decays, measured.
-TEST_F(LongSelection, SharpFrictionIsFollowedInFinerSteps) {
+/// Friction of 1.5 N that changes its sign within 0.16 mm/s: what a smoother misses of it by a sample the gauge reads at once.
+TEST(Selection, SharpFrictionIsFoundInPlucksAlone) {
   const Rig rig = read_rig(test::null_campaign("rig.toml"));
   const AeroelasticModel model = AeroelasticModel(rig, make_basis(rig, 1000, 998.2), wagner(Wagner::within_1e6)).with_effects({"coulomb-friction"});
   std::mt19937_64 random(1);
@@ -234,6 +234,7 @@ TEST_F(LongSelection, SharpFrictionIsFollowedInFinerSteps) {
     SimulateProblem truth{model, model.start_values(), planned.fine, {}, planned.release, {}};
     truth.theta[model.index("coulomb-friction.force")] = 1.5;
     truth.theta[model.index("coulomb-friction.velocity")] = 1.6e-4;
+    truth.law_steps = 8;
     unrig::Run run = every_nth(simulate(truth).run, PlannedRun::finer);
     for (Channel& c : run.channels)
       for (double& reading : c.value) reading += (c.name == "gauge" ? planned.noise : planned.angle_noise) * normal(random);
