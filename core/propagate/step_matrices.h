@@ -8,7 +8,7 @@
 namespace unrig {
 
 /// All that one step of a system with feedback does linearly, as one matrix from v = [x; f; jerk; u now; u next] to [x at the end; what the laws see in the middle and at the end, both without the
-/// forces there; outputs now]. A force is the parabola through its values at the beginning f, in the middle and at the end of the step (Lobatto IIIA, Hairer and Wanner 1996, II.7), so that both
+/// forces there; outputs now]. A force is the parabola through its values at the beginning f, in the middle and at the end of the step (Lobatto IIIA, Hairer and Wanner 1996, IV.5), so that both
 /// halves are exact steps (exact_step), from one to the other. The rows are padded for small_product.
 struct StepMatrices {
   static constexpr Eigen::Index nodes = 2;  ///< of a step whose forces are solved for: its middle and its end
