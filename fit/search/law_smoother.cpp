@@ -239,10 +239,10 @@ void LawSmoother::write_reading(Index k, Index channel, Eigen::Ref<RowVectorXd> 
   row[row.size() - 1] = w * (measured_(k, channel) - known);
 }
 
-/// What the channels read of the disturbances of a sample at once, channels x disturbances: of the laws' errors what they read of the laws.
+/// What the channels read of the disturbances of a sample at once, channels x disturbances: of the laws' errors what they read of the laws. Errors that last a part of a sample would be another noise of every reading.
 MatrixXd LawSmoother::read_disturbances() const {
   MatrixXd reads = MatrixXd::Zero(channels_, disturbances_);
-  reads.leftCols(static_cast<Index>(show_.size())) = system_.D.value.rightCols(laws_)(Eigen::all, show_);
+  if (parts_ == 1) reads.leftCols(static_cast<Index>(show_.size())) = system_.D.value.rightCols(laws_)(Eigen::all, show_);
   return reads;
 }
 

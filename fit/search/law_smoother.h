@@ -13,7 +13,7 @@ namespace unrig {
 ///
 ///   x_{k+1} = Phi x_k + Gamma0 f(z_k) + Gamma1 f(z_{k+1}) + G w_k + inputs,   y_k = C x_k + D (f(z_k) + e_k) + offset + noise
 ///
-/// with the least J = sum (noise / its sigma)^2 + sum (w / sigma)^2 over the first state, all w_k, the offsets and theta; e_k are the errors of laws among w_k, which a channel reads as it reads the laws. The disturbances w_k are an error of every
+/// with the least J = sum (noise / its sigma)^2 + sum (w / sigma)^2 over the first state, all w_k, the offsets and theta; e_k are the errors of laws among w_k, where a step is a sample: a channel reads them as it reads the laws. The disturbances w_k are an error of every
 /// law that the channels show by itself (not of a clock, nor of a memory that only another law looks at) and an unknown acceleration of every coordinate, constant over a step: a sample, or a part of it where a law asks for small steps. The laws see the trajectory that the data ask for instead of one that was
 /// followed from the start, so that an error of theirs does not grow along the record: J has no further minima as long as sigma is large, and as sigma
 /// shrinks, the trajectory becomes the model's own. Noise of a colour is taken for white. Memories, on which no disturbance acts, are
