@@ -11,7 +11,7 @@ namespace unrig {
 ///   seen_k = H S^k [dx_0; df_0] + sum_{j < k} H S^(k-1-j) P [df_j; djerk_j],   [dx_L; 0] = S^L [dx_0; df_0] + sum_{j < L} S^(L-1-j) P [df_j; djerk_j],
 ///
 /// df_j the forces in the middle and at the end of step j, S one step without these, P what they and the jerk add behind it, H the rows that see and read. That is the recursion
-/// x_{k+1} = S x_k + P f_k written out, for some 3 n + 2 L m products a step and direction instead of n^2.
+/// x_{k+1} = S x_k + P f_k written out, for some 3 n + 3 L m products a step and direction instead of n^2.
 ///
 /// A direction is a row, and rows are padded (padded_rows). `Work` is what one block works on.
 class BlockOfSteps {

@@ -36,13 +36,12 @@ ExactStep without_partials(ExactStep step) {
   return step;
 }
 
-
 }  // namespace
 
-StepMatrices::StepMatrices(const LinearSystem& system, const ExactStep& exact, const Arguments& seen, Index parameter_count)
+StepMatrices::StepMatrices(const LinearSystem& system, const ExactStep& with_partials, const Arguments& seen, Index parameter_count)
     : states(system.states()), feedbacks(static_cast<Index>(system.feedback.size())), arguments(seen.count()), channels(system.C.rows()), measured(system.B.cols() - feedbacks), parameters(parameter_count) {
   const Index n = states, m = feedbacks, q = measured, columns = input() + 2 * q;
-  const ExactStep half = parameters > 0 ? exact : without_partials(exact);
+  const ExactStep half = parameters > 0 ? with_partials : without_partials(with_partials);
   const MatrixXd between = inputs_in_the_middle(system, q, 2 * half.dt), now = between.leftCols(q), next = between.rightCols(q);
   const DualMatrix from0 = half.input0.block(0, 0, n, q), from1 = half.input1.block(0, 0, n, q);
 

@@ -65,7 +65,8 @@ TEST(SimulateNonlinear, QuadraticDragMeetsRungeKutta) {
   };
   const double coarse = miss(4e-3), fine = miss(2e-3);
   // (omega dt)^4 / 720 of the force is missed, 2e-8 at 4 ms, 81 times as much of its third harmonic; where the velocity changes sign the force's second derivative jumps by up to four times
-  // omega^2 of it, of which a parabola through three points misses up to a sixteenth over a step: (omega dt)^3 / 16, 1.6e-5, twice a period. Ten periods.
+  // omega^2 of it, of which a parabola through three points misses up to a sixteenth over a step: (omega dt)^3 / 16, 1.6e-5, twice in each of
+  // ten periods, of a drag that is a third of the spring's force on the mean.
   EXPECT_LT(coarse, 1e-4 * load);
   EXPECT_GT(coarse / fine, 5) << "third order";
   const VectorXd with = decay(zeta, load, 2e-3, seconds, "quadratic-drag", {coefficient}), without = decay(zeta, load, 2e-3, seconds, "", {});
@@ -97,7 +98,7 @@ TEST(SimulateNonlinear, DryFrictionTakesTheSameFromEveryCycle) {
   const VectorXd reading = decay(0, load, dt, (cycles + 0.5) * period, "coulomb-friction", {friction, 1e-5});
   for (int n = 1; n <= cycles; ++n) {
     const double turn = reading[static_cast<Index>(std::lround(n * period / dt))];
-    // While the velocity changes sign the force takes half a sample to follow, during which the rig moves by (omega dt)^2 / 2 of its amplitude: 1.2e-4 of a decrement,
+    // While the velocity changes sign the force takes a sample at most to follow, during which the rig moves by (omega dt)^2 / 2 of its amplitude: 1.2e-4 of a decrement,
     // and being late by half a sample each time shifts the phase; 1 % of a decrement is far above both and far below the 4 F.
     EXPECT_NEAR(turn, load - 4 * friction * n, 0.01 * 4 * friction) << n;
   }
@@ -153,7 +154,7 @@ TEST(SimulateNonlinear, HysteresisMeetsRungeKutta) {
     return (decay(zeta, load, dt, seconds, "bouc-wen", {F, yield, b, n}) - runge_kutta_of_hysteresis(zeta, load, dt, seconds, F, yield, b, n)).cwiseAbs().maxCoeff();
   };
   const double coarse = miss(4e-3), fine = miss(2e-3);
-  // Where the rig turns the rate of the memory has a kink, which a sample misses by the square of its length.
+  // Where the rig turns the rate of the memory has a kink, which a sample misses by the square of its length, a quarter of (omega dt)^2 at most: 1e-3 at 4 ms.
   EXPECT_LT(coarse, 1e-3 * F);
   EXPECT_GT(coarse / fine, 3) << "second order";
   EXPECT_GT(coarse, 0) << "two integrators, not one";
