@@ -22,6 +22,7 @@ struct FormParameter {
   In in;
   std::vector<double> starts;
   double lower = -INFINITY, upper = INFINITY;
+  bool scanned = true;  // false: the rig's own damping makes its change good
 };
 
 /// One line of the dictionary. Symbols that have a scale there are divided by what the runs reach.
@@ -55,7 +56,7 @@ std::vector<Line> lines() {
       {"damping with a power", ActsOn::normal, "-c * abs(v)^p * sign(v)", "", {damped, power(2, 0.05)}, {v}},
       {"damping with an even power", ActsOn::normal, "-c * abs(v)^p", "", {either, power(2)}, {v}},
       {"damping with the amplitude", ActsOn::normal, "-c * abs(x)^p * v", "", {falling, power(2)}, {x, v}},
-      {"damping of van der Pol", ActsOn::normal, "c * (1 - (x / s)^2) * v", "", {damped, {"s", In::x, {0.3, 0.8}, 0.02, 20}}, {v}},
+      {"damping of van der Pol", ActsOn::normal, "c * (1 - (x / s)^2) * v", "", {damped, {"s", In::x, {1}, 0.02, 20, false}}, {v}},
       {"spring with the speed squared", ActsOn::normal, "-c * x * v^2", "", {either}, {x, v}},
       {"dry friction", ActsOn::normal, "-f * tanh(v / s)", "", {{"f", In::force, {little}, 0}, {"s", In::v, {0.02}, 1e-3, 2}}, {}, "coulomb-friction"},
       {"friction of Stribeck", ActsOn::normal, "-f * (1 + r * exp(-abs(v) / s)) * tanh(v / (0.1 * s))", "", {{"f", In::force, {little}, 0}, {"r", In::number, {0.3}, -1, 10}, {"s", In::v, {0.05}, 5e-3, 2}}, {}},
@@ -160,7 +161,10 @@ Form put(const Line& line, const Reach& r) {
   if (line.power != 0) form.per_coefficient = std::pow(form.law.scales[static_cast<std::size_t>(line.scaled.front())], -line.power);
   for (const FormParameter& p : line.parameters)
     for (std::size_t i = 0; i < form.law.parameters.size(); ++i)
-      if (form.law.parameters[i].name == p.name) form.listed_order.push_back(static_cast<Eigen::Index>(i));
+      if (form.law.parameters[i].name == p.name) {
+        form.listed_order.push_back(static_cast<Eigen::Index>(i));
+        if (!p.scanned) form.stays.push_back(static_cast<Eigen::Index>(i));
+      }
   // The reader has sorted parameters as the formulas name them.
   for (const VectorXd& values : starts) {
     VectorXd sorted(values.size());
@@ -263,7 +267,8 @@ std::vector<VectorXd> shapes_of(const Form& form, Grid grid) {
   std::vector<VectorXd> shapes{form.starts.front()};
   const std::vector<Eigen::Index> linear = coefficients_of(law);
   for (std::size_t k = 0; k < law.parameters.size(); ++k) {
-    if (std::find(linear.begin(), linear.end(), static_cast<Eigen::Index>(k)) != linear.end()) continue;
+    const auto is_among = [k](const std::vector<Eigen::Index>& places) { return std::find(places.begin(), places.end(), static_cast<Eigen::Index>(k)) != places.end(); };
+    if (is_among(linear) || is_among(form.stays)) continue;
     const Parameter& p = law.parameters[k];
     std::vector<double> values;
     const bool is_corner = p.lower == 0 && p.upper < 1e30;  // between nothing and all that the runs reach

@@ -14,6 +14,7 @@ struct Form {
   std::vector<Eigen::VectorXd> starts; ///< of its parameters: a small force of either sign, and what shapes it may have
   std::string listed = {};             ///< id of the effect that it is, which goes by that; empty: of none
   std::vector<Eigen::Index> listed_order = {};  ///< places of its parameters in the order in which that effect has them
+  std::vector<Eigen::Index> stays = {};  ///< places of parameters whose change the rig's own damping makes good: no record prefers one of their values, and small ones ask for a damping below zero
   double per_coefficient = 1;          ///< what that effect has for its first parameter, over the law's
 };
 
