@@ -166,8 +166,8 @@ bool LawSearch::ask_for_a_curve() {
   std::optional<CurveOfState> curve = curve_of_state(problem_, base_, *beside_, least);
   if (!curve) return false;
   asked_ = asked_along(curve->beside);
-  asked_.push_back({std::move(curve->form), curve->evidence});
   keep_most_evident(asked_);
+  asked_.push_back({std::move(curve->form), curve->evidence});
   return true;
 }
 
@@ -358,7 +358,7 @@ void LawSearch::settle_first() {
   if (best.is_settled || !leaves_something_(best) || best.reduced_chi2() > nearly_explained || decays_decide(best) || bic_difference(best, base_) >= 0) return;
   if (all_driven(best.arrival.joint)) fit_from_first_guesses(problem_, best);
   settle(best);
-  best = in_finer_steps(with_lost_runs_followed(best));
+  best = with_lost_runs_followed(best);
   best.is_settled = true;
 }
 
