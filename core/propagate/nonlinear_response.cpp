@@ -91,10 +91,12 @@ Square inverse_of(const Square& m) {
   return m.inverse();
 }
 
-/// z = known + gain f with f = laws(z), from f = `start`; leaves f in laws.force. Newton's method, halved where the residual does not fall. Several laws
-/// keep the inverse of an earlier step as long as that takes the residual down. `inverse`: of 1 - slope gain.
+/// z = known + gain f with f = laws(z), from f = `start`; leaves f in laws.force. Newton's method; where the residual does not fall, once along the slopes at the arguments `before`, a step before, where
+/// friction that sticks is as steep as it will be, and halved where that does not help. Several laws
+/// keep the inverse of an earlier step as long as that takes the residual down. Where a law is steep its own rounding stays in the residual: a step that moves z by no more than
+/// rounding is not taken. `inverse`: of 1 - slope gain.
 template <class S>
-typename S::Seen solve_forces(Laws<S>& laws, const typename S::Seen& known, const typename S::Gain& gain, const typename S::Forces& start, typename S::Square& inverse) {
+typename S::Seen solve_forces(Laws<S>& laws, const typename S::Seen& known, const typename S::Gain& gain, const typename S::Forces& start, const typename S::Seen& before, typename S::Square& inverse) {
   constexpr int most = 60;
   constexpr double quickly = 0.1;
   typename S::Forces force = start, left;
@@ -118,6 +120,7 @@ typename S::Seen solve_forces(Laws<S>& laws, const typename S::Seen& known, cons
     const auto invert = [&] { inverse = inverse_of<typename S::Square>(S::Square::Identity(force.size(), force.size()) - laws.of_each(laws.slope).lazyProduct(gain)); };
     if constexpr (S::is_one_law) {
       invert();
+      if (!(gain.lazyProduct(inverse.lazyProduct(residual)).norm() > rounding)) return z;
       go(1);
     } else {
       const typename S::Seen slope = laws.slope;
@@ -127,6 +130,16 @@ typename S::Seen solve_forces(Laws<S>& laws, const typename S::Seen& known, cons
         invert();
         go(1);
       }
+    }
+    if (i == 0 && !(after < missed)) {
+      const typename S::Square here = inverse;
+      laws.at(before);
+      const typename S::Slopes own = laws.of_each(laws.slope);
+      inverse = inverse_of<typename S::Square>(S::Square::Identity(force.size(), force.size()) - own.lazyProduct(gain));
+      const typename S::Forces along = laws.force + own.lazyProduct(known - before);
+      force = inverse.lazyProduct(along);
+      after = missed_at(force);
+      if (!(after < missed)) inverse = here;
     }
     for (double share = 0.5; !(after < missed) && share > 1e-4; share /= 2) go(share);
     if (!(after < missed)) {  // stuck
@@ -161,7 +174,8 @@ class Follower {
         directions_(drive.start_tangent.cols()),
         carried_(parameters_that_act(system)),
         gain_(one_.late.middleRows(one_.argument(), one_.seen())),
-        inverse_(S::Square::Identity(one_.forces(), one_.forces())) {
+        inverse_(S::Square::Identity(one_.forces(), one_.forces())),
+        seen_(S::Seen::Zero(one_.seen())) {
     place_.assign(static_cast<std::size_t>(one_.parameters), -1);
     for (std::size_t a = 0; a < carried_.size(); ++a) place_[static_cast<std::size_t>(carried_[a])] = static_cast<Index>(a);
   }
@@ -226,7 +240,7 @@ class Follower {
     VectorXd known = arguments_.sees.value * drive_.start;
     if (one_.measured > 0) known += arguments_.sees_input.value.leftCols(one_.measured) * drive_.input.row(0).transpose();
     MatrixXd inverse = MatrixXd::Identity(m, m);
-    const VectorXd z = solve_forces<Many>(laws, known, of_forces, VectorXd::Zero(m), inverse);
+    const VectorXd z = solve_forces<Many>(laws, known, of_forces, VectorXd::Zero(m), known, inverse);
     now_.col(0).segment(one_.force(), m) = laws.force;
     MatrixXd partials(m, carried());
     if (carried() > 0) laws.partials_at(z, place_, partials);
@@ -286,7 +300,8 @@ class Follower {
       if (part == 0) response_.output.row(sample) = stepped_.segment(one_.output(), one_.channels).transpose();
       typename S::Forces held(one_.forces());
       held << v.segment(one_.force(), m), v.segment(one_.force(), m);
-      const typename S::Seen z = solve_forces<S>(laws_, stepped_.segment(one_.argument(), one_.seen()), gain_, held, inverse_);
+      const typename S::Seen z = solve_forces<S>(laws_, stepped_.segment(one_.argument(), one_.seen()), gain_, held, seen_, inverse_);
+      for (Index node = 0; node < StepMatrices::nodes; ++node) seen_.segment(node * one_.arguments, one_.arguments) = z.tail(one_.arguments);
       next.head(n) = stepped_.head(n);
       for (Index i = 0; i < one_.forces(); ++i) {
         next.head(n) += laws_.force[i] * one_.late.col(i).head(n);
@@ -388,6 +403,7 @@ class Follower {
   std::vector<Index> carried_, place_;  // parameters whose tangents are carried, and of each parameter where among them
   typename S::Gain gain_;       // arguments x forces: how the forces in the middle and at the end of a step move what the laws see there
   typename S::Square inverse_;  // of 1 - slope gain_, at a step before
+  typename S::Seen seen_;       // what the laws saw at the end of the step before, for each node
   NonlinearResponse response_;
   MatrixXd now_;  // of each step v, and its forces in the middle and at the end
   MatrixXd slope_, law_partial_, source_;

@@ -47,16 +47,10 @@ double power_over_noise(const std::vector<ImprovedRun>& runs, double ImprovedRun
   return sum;
 }
 
-/// How much more than before, as a share, runs that were not fitted may be left with: nothing where an effect acts in one of them. Where none does, what chi-square of so many samples scatters by.
-double tolerated(const Setting& files, const std::vector<std::string>& effects) {
-  if (effects.empty()) return 0;
-  const FitProblem& problem = *files.problem;
+/// How much more than before, as a share, runs that were not fitted may be left with: what chi-square of so many samples scatters by. Where what was found hardly acts, more is chance.
+double tolerated(const Setting& files) {
   double samples = 0;
-  for (const Run& run : files.heldout->empty() ? problem.runs : *files.heldout) {
-    samples += static_cast<double>(run.samples());
-    for (const std::string& id : effects)
-      if (effect(problem.rig, id).acts(problem.rig, conditions_of(run))) return 0;
-  }
+  for (const Run& run : files.heldout->empty() ? files.problem->runs : *files.heldout) samples += static_cast<double>(run.samples());
   return std::sqrt(2 / samples);
 }
 
@@ -75,7 +69,7 @@ FoundSet look_at(const DiagnoseProblem& problem, const Setting& files, const Tri
   e.remaining = what_remains(e.best);
   if (!problem.verdict_only) e.unseen = predict_unseen(files, baseline.arrival, setting, e.best);
   const bool adds_nothing = e.best.effects.empty() && setting.problem == files.problem;
-  e.predicts = adds_nothing || power_over_noise(e.unseen, &ImprovedRun::rms_after) <= (1 + tolerated(files, e.best.effects)) * power_over_noise(e.unseen, &ImprovedRun::rms_before);
+  e.predicts = adds_nothing || power_over_noise(e.unseen, &ImprovedRun::rms_after) <= (1 + tolerated(files)) * power_over_noise(e.unseen, &ImprovedRun::rms_before);
   return e;
 }
 

@@ -382,7 +382,7 @@ void Selection::grow(Trial& best, const std::function<bool(const Trial&)>& enoug
   Strings hopeless;  // laws with which alone the fit is worse than without: from that far away they are not found, and are not tried again before half of the way is gone
   while (!stopped_ && what_remains(best).found) {
     const double before = best.reduced_chi2();
-    best = with_lost_runs_followed(best);
+    best = in_finer_steps(with_lost_runs_followed(best));
     if (best.reduced_chi2() < before) ranking_.push_back({best.effects, best.reduced_chi2(), bic_difference(best, baseline_), 0, best.score});
     if (!what_remains(best).found) break;
     if (!best.effects.empty() && enough && enough(best)) {

@@ -358,7 +358,7 @@ void LawSearch::settle_first() {
   if (best.is_settled || !leaves_something_(best) || best.reduced_chi2() > nearly_explained || decays_decide(best) || bic_difference(best, base_) >= 0) return;
   if (all_driven(best.arrival.joint)) fit_from_first_guesses(problem_, best);
   settle(best);
-  best = with_lost_runs_followed(best);
+  best = in_finer_steps(with_lost_runs_followed(best));
   best.is_settled = true;
 }
 

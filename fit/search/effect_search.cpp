@@ -336,6 +336,49 @@ void leave_out_terms(Trial& trial) {
   }
 }
 
+void follow_finer(Trial& trial, Index times) {
+  JointProblem& joint = trial.arrival.joint;
+  for (RunResidual& run : joint.runs()) run.follow_in(times);
+  fit_fully(trial, 2);
+  const auto lost = [&](std::size_t r) { return joint.runs()[r].motion().unknowns() > 0 && trial.variance[r] > explained; };
+  bool any = false;
+  for (std::size_t r = 0; r < joint.runs().size(); ++r) any = any || lost(r);
+  if (!any) return;
+  fit_own_parameters(joint);  // theta is nearer now
+  temper(joint);
+  fit_fully(trial, 2);
+}
+
+namespace {
+
+/// Square sum of what finer steps alone move the readings by, over the noise.
+double moved_by_steps(const JointProblem& joint, Index times) {
+  std::vector<double> moved(joint.runs().size());
+  in_parallel(moved.size(), [&](std::size_t r) {
+    RunResidual run = joint.runs()[r];
+    if (run.is_aside()) return;
+    const Eigen::MatrixXd before = run.predict(joint.theta(r)).output;
+    run.follow_in(times);
+    const Eigen::MatrixXd after = run.predict(joint.theta(r)).output;
+    for (Index c = 0; c < after.cols(); ++c) moved[r] += (run.channel_weight(static_cast<std::size_t>(c)).array() * (after - before).col(c).array()).square().sum();
+  });
+  return std::accumulate(moved.begin(), moved.end(), 0.0);
+}
+
+}  // namespace
+
+Trial in_finer_steps(const Trial& trial) {
+  constexpr Eigen::Index finer = 4;
+  if (trial.effects.empty() || !nonlinear(trial) || decays_decide(trial) || trial.reduced_chi2() > nearly_explained || trial.excess() == 0 || trial.arrival.joint.runs().front().finer() >= finer) return trial;
+  constexpr double of_its_root = 0.293;  // 1 - sqrt(half_of_it): what moves the readings by less does not take half of what they are left with, by the triangle inequality
+  double samples = 0;
+  for (const RunResidual& run : trial.arrival.joint.runs()) samples += static_cast<double>(run.run().samples());
+  if (moved_by_steps(trial.arrival.joint, finer) < of_its_root * of_its_root * samples * trial.excess()) return trial;
+  Trial again = trial;
+  follow_finer(again, finer);
+  return again.excess() < half_of_it * trial.excess() ? again : trial;
+}
+
 double left_of_decays(const Trial& trial) {
   double power = 0, count = 0;
   for (std::size_t r = 0; r < trial.variance.size(); ++r) {

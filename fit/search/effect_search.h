@@ -110,6 +110,13 @@ std::vector<Trial> taken_away(const FitProblem& problem, const Trial& trial);
 /// Leaves out those terms of its effects (Effect::terms) without which the evidence is no less, held at no amplitude.
 void leave_out_terms(Trial& trial);
 
+/// Follows its nonlinear laws in so many times the steps that they ask for, and fits again.
+void follow_finer(Trial& trial, Eigen::Index times);
+
+/// With a law at work that leaves something near the noise: the same followed in finer steps, where these leave less than half of it. What coarse steps make of a sharp law is no effect; where they are
+/// not what is missing, they would only make everything after it dearer.
+Trial in_finer_steps(const Trial& trial);
+
 /// The same all over again from first guesses, with windows that grow from a few periods: for effects without which the rig's parameters go far astray. Keeps the better.
 void fit_from_first_guesses(const FitProblem& problem, Trial& trial);
 

@@ -5,11 +5,13 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <numbers>
 #include <vector>
 
 #include "core/effects/effect.h"
 #include "core/numerics/spline_curvature.h"
+#include "core/numerics/work.h"
 #include "tests/support/sample_data.h"
 
 namespace unrig {
@@ -62,6 +64,35 @@ TEST(NonlinearResponse, AGapKeepsEnergyAndPeriod) {
     if (fine(k, 0) > 0 && fine(k + 1, 0) <= 0) crossings.push_back(dt * (static_cast<double>(k) + fine(k, 0) / (fine(k, 0) - fine(k + 1, 0))));
   ASSERT_GT(crossings.size(), static_cast<std::size_t>(periods));
   EXPECT_NEAR((crossings[periods] - crossings[0]) / periods / exact, 1, 1e-3) << "a loss of 1 % would change it by 0.1 %";
+}
+
+double dry_friction(const double* z, const double* p, double* slope, double*) {
+  const double t = std::tanh(*z / p[0]);
+  *slope = -(1 - t * t) / p[0];
+  return -t;
+}
+
+/// What following x'' = -omega^2 x - 0.02 omega^2 tanh(x' / v) from x = 1 at rest until it sticks costs.
+std::uint64_t work_of_friction(double v, Index samples) {
+  LinearSystem system;
+  system.A = DualMatrix(MatrixXd{{0, 1}, {-omega * omega, 0}});
+  system.B = DualMatrix(MatrixXd{{0}, {0.02 * omega * omega}});
+  system.C = DualMatrix(MatrixXd::Identity(2, 2));
+  system.D = DualMatrix(MatrixXd::Zero(2, 1));
+  system.coordinates = 1;
+  system.feedback.push_back({Eigen::RowVector2d(0, 1), 0, 1, dry_friction, nullptr, 1});
+  const VectorXd theta = VectorXd::Constant(1, v);
+  const std::uint64_t before = work_done();
+  const MatrixXd motion = follow(system, step_to_follow(system, dt), theta, {Eigen::Vector2d(1, 0), {}, {}, MatrixXd(samples, 0), {}}, samples, Partials::none).output;
+  EXPECT_LT(std::abs(motion(samples - 1, 1)), 1e-3 * omega);
+  return work_done() - before;
+}
+
+/// Where friction sticks, Newton's method from the force of the step before leaves the narrow range in which the force is not full; the slope at the speed before leads into it at once.
+TEST(NonlinearResponse, AFrictionThatSticksCostsNoMoreThanTwiceOneThatSlides) {
+  constexpr Index samples = 400;  // it slides for the first 120
+  const double slides = static_cast<double>(work_of_friction(0.1 * omega, samples));
+  for (const double v : {1e-8, 1e-7, 1e-6}) EXPECT_LT(static_cast<double>(work_of_friction(v * omega, samples)), 2 * slides) << v;
 }
 
 double minus(const double* z, const double*, double* slope, double*) {

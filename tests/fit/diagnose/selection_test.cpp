@@ -211,7 +211,7 @@ TEST(Selection, ALawIsChallengedByForcesThatAreNone) {
   EXPECT_TRUE(tried(d, {"speed-surge"})) << "otherwise this campaign tests nothing of the challenge";
 }
 
-/// A friction of 544 times the noise, and hum below it: what is left of following a friction in whole samples is no slower build-up and no separation.
+/// A friction of 544 times the noise, and hum below it: what following the friction in whole samples leaves had got a slower build-up and a separation, until finer steps left less and the rest no name.
 TEST(Selection, WhatIsLeftOfALawIsGivenNoNameThatDoesNotExplainIt) {
   const TrialCampaign campaign = pair(3602, 19, {"coulomb-friction", "mains-hum"}, true);
   ASSERT_LT(campaign.sizes[1], 0.3);
