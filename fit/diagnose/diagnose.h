@@ -136,8 +136,8 @@ struct Diagnosis {
 /// 6. Laws, of the list and of no list, are looked for (fit/laws/law_search.h) before step 2 where one of them promises most of all effects, and otherwise where something remains all the same, from the fit with nothing
 ///    missing, else beside the best set.
 /// An effect is named only where no significant mismatch remains beside the set it belongs to, or nearly all of the excess is gone (which is not enough for signals
-/// with amplitudes of their own in every run), and where runs that were not fitted are predicted better with it than without: those held out or, where there are
-/// none, each fitted run from the others. Otherwise the mismatch is unexplained, and the force is given that would explain it.
+/// with amplitudes of their own in every run), and where runs that were not fitted are predicted no worse with it than without, but for chance: those held out or, where there
+/// are none, each fitted run from the others. Otherwise the mismatch is unexplained, and the force is given that would explain it.
 ///
 /// Limits end the search, not the description of what it found. With a limit of work alone the answer does not depend on the machine's speed. One diagnosis at a time has a limit of time: processor time is the process's
 /// (core/numerics/time_limit.h).
