@@ -91,10 +91,9 @@ Square inverse_of(const Square& m) {
   return m.inverse();
 }
 
-/// z = known + gain f with f = laws(z), from f = `start`; leaves f in laws.force. Newton's method; where the residual does not fall, once along the slopes at the arguments `before`, a step before, where
-/// friction that sticks is as steep as it will be, and halved where that does not help. Several laws
-/// keep the inverse of an earlier step as long as that takes the residual down. Where a law is steep its own rounding stays in the residual: a step that moves z by no more than
-/// rounding is not taken. `inverse`: of 1 - slope gain.
+/// z = known + gain f with f = laws(z), from f = `start`; leaves f in laws.force. Newton's method. Where a step does not take the residual down it is tried once along the slopes at `before`, what the laws saw a step
+/// before (friction that sticks is as steep there as it will be), and then halved. Several laws keep the inverse of an earlier step as long as that takes the residual down. The rounding of a steep law stays in the residual:
+/// a step that moves z by no more than rounding is not taken. `inverse`: of 1 - slope gain.
 template <class S>
 typename S::Seen solve_forces(Laws<S>& laws, const typename S::Seen& known, const typename S::Gain& gain, const typename S::Forces& start, const typename S::Seen& before, typename S::Square& inverse) {
   constexpr int most = 60;

@@ -47,7 +47,7 @@ double power_over_noise(const std::vector<ImprovedRun>& runs, double ImprovedRun
   return sum;
 }
 
-/// How much more than before, as a share, runs that were not fitted may be left with: what chi-square of so many samples scatters by. Where what was found hardly acts, more is chance.
+/// How much more than before, as a share, runs that were not fitted may be left with: what chi-square of so many samples scatters by, for where what was found hardly acts it is chance whether that is more or less.
 double tolerated(const Setting& files) {
   double samples = 0;
   for (const Run& run : files.heldout->empty() ? files.problem->runs : *files.heldout) samples += static_cast<double>(run.samples());
