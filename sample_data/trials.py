@@ -73,7 +73,7 @@ def held(trial):
     """Whether the set of explanations holds what is true; `something-else` is none of the others."""
     hidden = sorted(trial["hidden"])
     alike = [sorted(one) for one in trial["explanations"]]
-    return hidden in alike or (trial["misread"] is not None and sorted([*hidden, "rig-description"]) in alike) or (bool(hidden) and ["something-else"] in alike) or trial["right"]
+    return hidden in alike or (trial["misread"] not in (None, "stated") and sorted([*hidden, "rig-description"]) in alike) or (bool(hidden) and ["something-else"] in alike) or trial["right"]
 
 
 def seeds(results):
@@ -146,7 +146,7 @@ def main():
         count = collections.Counter(kind(t) for t in seen)
         wrong = sorted({" + ".join(sorted(t["found"])) for t in seen if kind(t) == "wrong"})
         print(f"| {name} | {len(own)} | {len(seen)} | " + " | ".join(str(count[c]) for c in columns) + f" | {nine_in_ten(own)} | {', '.join(wrong)} |")
-    for what, of in (("noise", lambda t: t["noise"]), ("files", lambda t: f"{t['misread'].split('.')[0]} off" if t["misread"] else "exact")):
+    for what, of in (("noise", lambda t: t["noise"]), ("files", lambda t: "exact" if not t["misread"] else "off as stated" if t["misread"] == "stated" else f"{t['misread'].split('.')[0]} off")):
         print(f"\n| {what} | campaigns | size {VISIBLE} or more | " + " | ".join(columns) + " |\n" + "| --- " * (len(columns) + 3) + "|")
         for name in sorted({of(t) for t in hidden}):
             own = [t for t in hidden if of(t) == name]
@@ -166,7 +166,7 @@ def main():
     if sets:
         seen = [t for t in sets if not t["hidden"] or size(t) >= VISIBLE]
         print(f"\nThe set of explanations holds the truth in {share(sum(map(held, sets)), len(sets))}, where nothing is hidden or size {VISIBLE} or more in {share(sum(map(held, seen)), len(seen))}; {statistics.mean(len(t['explanations']) for t in sets):.2f} members on the mean.")
-    for what, of in (("", trials), (" of campaigns with exact files", [t for t in trials if not t["misread"]])):
+    for what, of in (("", trials), (" of campaigns with exact files", [t for t in trials if not t["misread"]]), (" of campaigns whose files state what they are off by", [t for t in trials if t["misread"] == "stated"])):
         deviations = [abs(p["value"] - p["truth"]) / p["std_error"] for t in of for p in t.get("named", [])]
         if deviations:
             print(f"\nIntervals of parameters of hidden effects that were named{what}: 68 % hold the truth in {share(sum(d < 1 for d in deviations), len(deviations))}, 95 % in {share(sum(d < 1.96 for d in deviations), len(deviations))}.")

@@ -11,6 +11,7 @@
 #include "core/effects/effect.h"
 #include "core/law/law_effect.h"
 #include "core/model/system_layout.h"
+#include "core/run/deviation_slopes.h"
 
 namespace unrig {
 namespace {
@@ -33,6 +34,30 @@ void keep_inputs(LinearSystem& system, const std::vector<Index>& recorded) {
   for (Feedback& f : system.feedback)  // states that came later
     for (MatrixXd* m : {&f.sees, &f.sees_rates})
       if (m->rows() > 0) m->conservativeResizeLike(MatrixXd::Zero(m->rows(), system.states()));
+}
+
+/// Errors of numbers, from the parameter `first` on.
+void add_deviations(LinearSystem& system, const DeviationSlopes& slopes, const VectorXd& theta, Index first) {
+  const std::vector<SystemSlope>& of = slopes.by_states.at(system.states());
+  const auto add = [&](DualMatrix& to, Index row, Index parameter, const MatrixXd& slope) {
+    if (slope.isZero(0)) return;
+    MatrixXd change = MatrixXd::Zero(to.rows(), to.cols());
+    change.middleRows(row, slope.rows()) = slope;
+    to.value += theta[parameter] * change;
+    to.partial.resize(static_cast<std::size_t>(theta.size()));
+    to.add_partial(parameter, change);
+  };
+  for (std::size_t k = 0; k < of.size(); ++k) {
+    const Index parameter = first + static_cast<Index>(k);
+    add(system.A, 0, parameter, of[k].A);
+    add(system.B, 0, parameter, of[k].B);
+    for (std::size_t row = 0; row < slopes.outputs.size(); ++row) {
+      const auto output = std::find(system.outputs.begin(), system.outputs.end(), slopes.outputs[row]);
+      if (output == system.outputs.end()) continue;
+      add(system.C, output - system.outputs.begin(), parameter, of[k].C.row(static_cast<Index>(row)));
+      add(system.D, output - system.outputs.begin(), parameter, of[k].D.row(static_cast<Index>(row)));
+    }
+  }
 }
 
 /// Lets an effect change the system, by no more states than it said before it saw theta: searches carry states from one theta to the next.
@@ -59,6 +84,7 @@ AeroelasticModel::AeroelasticModel(Rig rig, Basis basis, IndicialFunction circul
                    {"normal_force_slope", "1/rad", 2 * pi, -20, 50, true, "Record a step of the angle at this speed.", Role::slope}};
     for (Index k = 0; build_up_ == Circulation::free && k < circulation_.amplitude.size(); ++k)
       parameters_.push_back({fmt::format("circulation.amplitude[{}]", k + 1), "1", circulation_.amplitude[k], -10, 10, true, "Record a fast step of the angle and the run behind it.", Role::amplitude});
+    list_deviations();
     return;
   }
   for (std::size_t i = 0; i < rig_.modal.size(); ++i) {
@@ -70,6 +96,17 @@ AeroelasticModel::AeroelasticModel(Rig rig, Basis basis, IndicialFunction circul
     parameters_.push_back({prefix + "stiffness", "N/m", mode.mass * omega * omega, 0, 1e6 * mode.mass * omega * omega, false, {}, Role::stiffness, which});
     parameters_.push_back({prefix + "damping", "N.s/m", 2 * mode.damping_ratio * mode.mass * omega, 0, 1e3 * mode.mass * omega, false, {}, Role::damping, which});
     parameters_.push_back({prefix + "mount_participation", "kg", mode.mass, -1e12 * mode.mass, 1e12 * mode.mass, false, "Record a run with the mount moving.", Role::load, which});
+  }
+  list_deviations();
+}
+
+void AeroelasticModel::list_deviations() {
+  constexpr double beyond_belief = 100;
+  first_deviation_ = static_cast<Index>(parameters_.size());
+  for (Index k = 0; k < rig_.deviations; ++k) {
+    Parameter p{fmt::format("deviation[{}]", k + 1), "1", 0, -beyond_belief, beyond_belief};
+    p.known_to = 1;
+    parameters_.push_back(std::move(p));
   }
 }
 
@@ -98,7 +135,8 @@ LinearSystem AeroelasticModel::system(const Conditions& conditions, const Vector
       for (const GaugeFilter& filter : rig_.gauge_filters) append_gauge_filter(s, gauge - channels.begin(), filter);
     return s;
   };
-  if (effects_.empty()) {
+  const bool exact = rig_.deviations == 0 || conditions.deviations == nullptr;
+  if (effects_.empty() && exact) {
     LinearSystem system = rig_.is_modal() ? modal_system(conditions, theta, channels) : amplify(beam_system(conditions, theta, channels));
     std::vector<Index> recorded{0, 1, 2};
     recorded.resize(static_cast<std::size_t>(system.B.cols()));
@@ -109,6 +147,7 @@ LinearSystem AeroelasticModel::system(const Conditions& conditions, const Vector
   Conditions with_ports = conditions;
   with_ports.force = with_ports.mount = with_ports.ports = true;
   LinearSystem system = rig_.is_modal() ? modal_system(with_ports, theta, channels) : beam_system(with_ports, theta, channels);
+  if (!exact) add_deviations(system, *conditions.deviations, theta, first_deviation_);
   const auto strips = static_cast<Index>(rig_.submerged.size());
   Index first = theta.size();
   for (const std::string& id : effects_) first -= static_cast<Index>(effect(rig_, id).parameters_on(rig_).size());

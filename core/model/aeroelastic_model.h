@@ -2,6 +2,7 @@
 #include <Eigen/Core>
 #include <complex>
 #include <functional>
+#include <limits>
 #include <string>
 #include <vector>
 
@@ -30,6 +31,7 @@ struct Parameter {
   bool torsion = false;     ///< of a beam: of its torsional modes
   std::string effect = {};  ///< whose it is; empty: the rig's own
   int place = -1;           ///< among the parameters of that effect, from 0
+  double known_to = std::numeric_limits<double>::infinity();  ///< standard deviation of what is known of it beside the runs, about `start`
 };
 
 /// What of a run's conditions enters the model.
@@ -42,6 +44,7 @@ struct Conditions {
   double onset_angle = 0;  ///< rad, of the shaft before it moves; 0 where the run has no angle
   bool ports = false;      ///< further inputs behind these: a normal force on each strip [N], a generalised force on each coordinate. All inputs are then straight between samples
   double nyquist = 0;  ///< Hz, half the sampling rate; 0: not known
+  const DeviationSlopes* deviations = nullptr;  ///< the run's own (Run::deviations)
 };
 
 /// A static nonlinear function f(z) that rides on the linear system: it drives one input column and looks at a few combinations of the states and of their rates, its arguments
@@ -101,6 +104,8 @@ struct LinearSystem {
 /// Gauge: bending moment at its station over the lever to the calibration station, as the sum over all forces outboard, inertial ones included,
 /// so that the static part of modes left out is kept (tests/verification/one_mode_test.cpp).
 ///
+/// Errors of the numbers of rig file and head that are parameters ("deviation[k]", Rig::deviations) move the matrices in proportion, each as the run says (Run::deviations); they are known to one standard deviation.
+///
 /// A rig that is known only as modes: m q'' + c q' + k q = force - g acceleration of the mount, gauge = sum of gain times q.
 class AeroelasticModel {
  public:
@@ -138,12 +143,14 @@ class AeroelasticModel {
  private:
   LinearSystem beam_system(const Conditions&, const Eigen::VectorXd&, const std::vector<std::string>&) const;
   LinearSystem modal_system(const Conditions&, const Eigen::VectorXd&, const std::vector<std::string>&) const;
+  void list_deviations();
 
   Rig rig_;
   Basis basis_;
   IndicialFunction circulation_;
   Circulation build_up_;
   std::vector<Parameter> parameters_;
+  Eigen::Index first_deviation_ = 0;  ///< among the parameters
   std::vector<std::string> effects_;
 };
 

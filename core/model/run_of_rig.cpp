@@ -74,6 +74,7 @@ Conditions conditions_of(const Run& run) {
   c.nyquist = run.dt > 0 ? 0.5 / run.dt : 0;
   c.prescribed_pitch = run.find("alpha") != nullptr && run.kind == RunKind::step;
   c.force = run.find("force") != nullptr;
+  c.deviations = run.deviations.get();
   c.mount = run.find("mount_velocity") != nullptr || run.find("mount_acceleration") != nullptr;
   if (const Channel* alpha = run.find("alpha")) c.onset_angle = first_angle(alpha->value);
   return c;

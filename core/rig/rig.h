@@ -73,6 +73,7 @@ struct Rig {
   std::vector<Sensor> sensors;
   std::vector<ModalMode> modal;
   std::vector<std::shared_ptr<const Effect>> laws;  ///< that a user wrote down; effects of this rig beside those of the table
+  Eigen::Index deviations = 0;  ///< errors of its numbers and of its runs' heads that are parameters of its models, in standard deviations (core/run/deviation_slopes.h)
   std::shared_ptr<const Givens> givens;             ///< stated uncertainties of the numbers above; none: all are exact
   std::vector<std::string> warnings;
 

@@ -11,6 +11,7 @@
 
 namespace unrig {
 
+struct DeviationSlopes;
 struct Givens;
 
 /// How a recording was made (correct/manual/run_files.md): prescribed pitch, free decay, measured force, moved mount.
@@ -57,6 +58,7 @@ struct Run {
   std::optional<Hold> hold;   ///< of a pluck that was held when its record began
   std::vector<Channel> channels;
   std::shared_ptr<const Givens> givens;  ///< stated uncertainties of the header's numbers; none: all are exact
+  std::shared_ptr<const DeviationSlopes> deviations;  ///< of a model whose parameters they are (Rig::deviations); none: no error moves it
   std::vector<std::string> warnings;
 
   Eigen::Index samples() const { return channels.empty() ? 0 : channels.front().value.size(); }

@@ -37,7 +37,7 @@ FoundSet laws_beside(const RigDescription& description, const DiagnoseProblem& p
   if (set) begun = same_effects_beside(description, *set);
   Trial best = beside.best_set({}, begun ? &*begun : nullptr);
   if (beside.stopped()) throw OutOfTime{};
-  FoundSet with = look_at(problem, files, baseline, {description.problem.get(), &description.heldout}, std::move(best), description.cost);
+  FoundSet with = look_at(problem, files, baseline, description.setting(), std::move(best), description.cost);
   for (Candidate c : beside.ranking()) {
     if (c.effects.empty()) continue;
     c.effects.insert(c.effects.begin(), rig_description_id);
@@ -51,7 +51,7 @@ bool weigh_description(const DiagnoseProblem& problem, const Setting& files, con
   const double against_baseline = bic_difference(description.trial, baseline) + description.cost;
   selection.add({{rig_description_id}, description.trial.reduced_chi2(), against_baseline, 0, description.promised});
   if (found.explains() && against_baseline > -decisive) return false;
-  FoundSet with = beside ? std::move(*beside) : look_at(problem, files, baseline, {description.problem.get(), &description.heldout}, description.trial, description.cost);
+  FoundSet with = beside ? std::move(*beside) : look_at(problem, files, baseline, description.setting(), description.trial, description.cost);
   if (!with.explains() && !found.explains() && !beside) limits.spend([&] { with = laws_beside(description, problem, files, baseline, selection); });
   const bool laws_named = !found.best.effects.empty() && naming_of(found.best, baseline, found.clean(), found.predicts) == Naming::named;
   if (!with.explains() || (laws_named && bic_difference(found.best, with.best) - with.cost < -decisive)) return false;

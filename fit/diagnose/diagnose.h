@@ -127,7 +127,8 @@ struct Diagnosis {
 };
 
 /// 1. The best fit with nothing missing, runs that it cannot explain weighted down; its residual is tested for energy, colour and a single line.
-///    Where it differs from noise and no number states an uncertainty, the rig's description is the first candidate (fit/diagnose/rig_description.h).
+///    Where it differs from noise and no number states an uncertainty, the rig's description is the first candidate (fit/diagnose/rig_description.h). Numbers that state one are parameters of this fit and of all
+///    others, known to what is stated (fit/givens/number_parameters.h).
 /// 2. Every candidate is linearised there: how much of the residual could one step in its parameters and the rig's remove?
 /// 3. The promising ones are fitted in full, everything free, while the weights return to those of the noise. They are compared by BIC with each run's
 ///    own variance and with as many samples as the remaining colour leaves independent.

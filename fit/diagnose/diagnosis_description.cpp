@@ -1,15 +1,20 @@
 #include "fit/diagnose/diagnosis_description.h"
 
 #include <algorithm>
+#include <cmath>
 #include <iterator>
 #include <set>
+#include <stdexcept>
 #include <utility>
 
 #include <fmt/format.h>
 
 #include "core/effects/effect.h"
 #include "core/law/law_effect.h"
+#include "core/rig/fingerprint.h"
 #include "fit/fit_description.h"
+#include "fit/givens/inexact_rig.h"
+#include "fit/search/screening.h"
 #include "fit/search/noise_of_trial.h"
 
 namespace unrig {
@@ -52,6 +57,74 @@ bool is_idle(const JointProblem& joint, const std::string& id) {
 
 Settle settled(const Trial& trial) { return trial.reduced_chi2() < twice_the_noise ? Settle::all : Settle::nothing; }
 
+/// What was found, with the numbers of the files where it has them: in the rig that they make, not in parameters. Where no rig has such numbers, as beside a law that is missing, with those that are stated.
+struct AtItsNumbers {
+  Eigen::VectorXd off;
+  std::shared_ptr<FitProblem> problem;
+  Arrival arrival;
+};
+AtItsNumbers at_its_numbers(const FitProblem& errors, Eigen::VectorXd off, const Arrival& found, const std::vector<std::string>& effects) {
+  const StatedNumbers numbers(errors.rig, errors.runs);
+  auto there = std::make_shared<FitProblem>();
+  const auto take_numbers = [&] {
+    there->rig = numbers.rig_at(off);
+    there->runs.clear();
+    for (std::size_t r = 0; r < errors.runs.size(); ++r) {
+      there->runs.push_back(numbers.run_at(r, off));
+      there->runs.back().givens = nullptr;
+    }
+  };
+  try {
+    take_numbers();
+  } catch (const std::invalid_argument&) {
+    off.setZero();
+    take_numbers();
+  }
+  there->rig.givens = nullptr;
+  there->rig.laws = found.model->rig().laws;
+  there->circulation = errors.circulation;
+  there->effects = effects;
+  Arrival arrival = transferred(*there, found, std::make_shared<const AeroelasticModel>(model_of(there->rig, there->runs, there->circulation, effects)));
+  for (Unknown& u : arrival.joint.unknowns())
+    for (const Unknown& known : found.joint.unknowns())
+      if (known.run == u.run && found.joint.parameter(known).name == arrival.joint.parameter(u).name) u.held = known.held, u.why_held = known.why_held;
+  for (RunResidual& run : arrival.joint.runs()) run.temper(1);
+  return {std::move(off), std::move(there), std::move(arrival)};
+}
+
+/// Effects and the numbers of the files together.
+FitResult fit_with_numbers(FitProblem errors, AtItsNumbers& found, Settle settle) {
+  errors.effects = found.problem->effects;
+  errors.rig.laws = found.problem->rig.laws;
+  InexactRig inexact(errors, found.off);
+  Arrival arrival = found.arrival;
+  solve(arrival);
+  inexact.search(arrival);
+  FitResult fit = describe_fit(arrival, errors, settle, &inexact);
+  found.off = inexact.deviations();
+  found.problem->rig = inexact.rig();
+  found.problem->runs = inexact.runs();
+  return fit;
+}
+
+/// The fit with these numbers taken for known. Its rig and its recordings are those of the files.
+FitResult told_with_numbers_known(const FitProblem& errors, const AtItsNumbers& found, Settle settle, const SearchLimits& limits) {
+  FitResult fit = told(found.arrival, *found.problem, settle, limits);
+  for (std::size_t r = 0; r < fit.runs.size(); ++r) fit.runs[r].fingerprint = fingerprint(errors.runs[r], errors.rig);
+  fit.rig_fingerprint = fingerprint(errors.rig);
+  fit.givens = InexactRig(errors, found.off).numbers();
+  for (FittedGiven& g : fit.givens) g.std_error = 0;
+  const auto parameters = static_cast<Eigen::Index>(fit.parameters.size()), count = static_cast<Eigen::Index>(fit.givens.size());
+  const Eigen::VectorXd deviation = Eigen::VectorXd::NullaryExpr(parameters, [&](Eigen::Index i) {
+    const double error = fit.parameters[static_cast<std::size_t>(i)].std_error;
+    return std::isfinite(error) ? error : 0;
+  });
+  fit.joint_covariance = Eigen::MatrixXd::Zero(parameters + count, parameters + count);
+  fit.joint_covariance.topLeftCorner(parameters, parameters) = deviation.asDiagonal() * fit.correlation * deviation.asDiagonal();
+  fit.warnings.push_back("standard errors are those with the numbers of rig file and heads known, which are uncertain");
+  return fit;
+}
+
 double probability_of(const std::string& id, const std::vector<Candidate>& ranking) {
   double sum = 0;
   for (const Candidate& c : ranking)
@@ -61,23 +134,48 @@ double probability_of(const std::string& id, const std::vector<Candidate>& ranki
 
 }  // namespace
 
-FitResult fit_with(const FoundSet& found, const SearchLimits& limits) {
-  FitProblem after = *found.setting.problem;
-  after.effects = found.best.effects;
-  return told(found.best.arrival, after, settled(found.best), limits);
+void tell_fit(const DiagnoseProblem& problem, const FilesToFit& files, const SearchLimits& limits, FoundSet& found) {
+  const bool of_files = found.setting.problem == &files.problem, exact = of_files && !states_errors(problem.rig, problem.runs);
+  if (exact) {
+    FitProblem after = files.problem;
+    after.effects = found.best.effects;
+    found.fit = told(found.best.arrival, after, settled(found.best), limits);
+    return;
+  }
+  const FitProblem errors = with_errors_of_files(problem);
+  AtItsNumbers there = at_its_numbers(errors, of_files ? deviations_at(files, found.best.arrival.joint) : found.setting.off, found.best.arrival, found.best.effects);
+  if (!limits.describe([&] { found.fit = fit_with_numbers(errors, there, settled(found.best)); })) {
+    found.fit = told_with_numbers_known(errors, there, Settle::nothing, limits);
+  }
+  found.fitted = std::move(there.problem);
 }
 
-void describe(const FitProblem& fit_problem, const Trial& baseline, const SearchLimits& limits, FoundSet& e, Diagnosis& d) {
+void describe(const DiagnoseProblem& problem, const FilesToFit& files, const Trial& baseline, const SearchLimits& limits, FoundSet& e, Diagnosis& d) {
+  const FitProblem& fit_problem = files.problem;
   const Trial& best = e.best;
-  const bool described = e.setting.problem != &fit_problem;
-  Arrival before_arrival = baseline.arrival;
-  if (d.mismatch.found) {
-    PlainFit plain = plain_fit(fit_problem, baseline.arrival, d.unexplained && !has_colour(baseline.arrival.joint));  // first guesses know of none
-    before_arrival = std::move(plain.arrival);
-    if (plain.baseline_was_lost) d.not_followed.insert(d.not_followed.begin(), std::vector<std::string>{});
+  const bool stated = states_errors(problem.rig, problem.runs), described = e.setting.problem != &fit_problem;
+  if (stated && !d.mismatch.found) {
+    tell_fit(problem, files, limits, e);
+    d.before = e.fit;
+  } else {
+    Arrival before = baseline.arrival;
+    if (d.mismatch.found) {
+      PlainFit plain = plain_fit(fit_problem, baseline.arrival, d.unexplained && !stated && !has_colour(baseline.arrival.joint));  // first guesses know of none
+      before = std::move(plain.arrival);
+      if (plain.baseline_was_lost) d.not_followed.insert(d.not_followed.begin(), std::vector<std::string>{});
+    }
+    const Settle settle = d.mismatch.found ? Settle::nothing : Settle::all;  // a fit that explains nothing deserves no refinement
+    if (stated) {
+      const FitProblem errors = with_errors_of_files(problem);
+      AtItsNumbers there = at_its_numbers(errors, deviations_at(files, before.joint), before, {});
+      limits.describe([&] { solve(there.arrival); });
+      d.before = told_with_numbers_known(errors, there, settle, limits);
+    } else {
+      d.before = told(before, fit_problem, settle, limits);
+    }
+    if (best.effects.empty() && !described) e.fit = d.before;
+    else tell_fit(problem, files, limits, e);
   }
-  d.before = told(before_arrival, fit_problem, d.mismatch.found ? Settle::nothing : Settle::all, limits);  // a fit that explains nothing deserves no refinement
-  e.fit = best.effects.empty() && !described ? d.before : fit_with(e, limits);
   d.after = e.fit;
   if (described && best.effects.empty()) d.after = d.before;
   if (described && !best.effects.empty()) {
@@ -127,9 +225,9 @@ void tell_equivalent(const FoundSet& found, bool described, const std::vector<Tr
 }
 
 MissingEffect missing_description(const RigDescription& description, const FoundSet& found, const FitProblem& fit_problem, const Diagnosis& d) {
-  MissingEffect m = description.as_missing();
+  MissingEffect m = as_missing(found.fitted ? found.fit.givens : description.numbers);
   m.probability = probability_of(m.effect, d.ranking);
-  if (const double change = found.fit.parameters.empty() ? 0 : change_of_load(fit_problem, d.before, *description.problem, found.fit); change != 0)
+  if (const double change = found.fit.parameters.empty() ? 0 : change_of_load(fit_problem, d.before, found.fitted ? *found.fitted : *description.problem, found.fit); change != 0)
     m.advice += fmt::format(". With them the loads at the ends of the steps are {:+.2g} % off those of the rig as the file has it", change);
   return m;
 }

@@ -5,15 +5,16 @@
 #include "fit/diagnose/explanation.h"
 #include "fit/diagnose/rig_description.h"
 #include "fit/diagnose/search_limits.h"
+#include "fit/givens/number_parameters.h"
 
 namespace unrig {
 
-/// The fit with what was found, in full.
-FitResult fit_with(const FoundSet& found, const SearchLimits& limits);
+/// `found.fit`: the fit with what was found, in full. Where the numbers of the files are not exact they are fitted beside it, and its standard errors allow for theirs.
+void tell_fit(const DiagnoseProblem& problem, const FilesToFit& files, const SearchLimits& limits, FoundSet& found);
 
-/// Both fits in full, and what they leave of the fitted runs. Of an explanation with the rig's description put right `d.after` is the fit with its laws to the rig as the files have it: no fit is told that
-/// belongs to a rig in no file.
-void describe(const FitProblem& fit_problem, const Trial& baseline, const SearchLimits& limits, FoundSet& e, Diagnosis& d);
+/// Both fits in full, and what they leave of the fitted runs. Of an explanation with the rig's description put right beyond what the files state `d.after` is the fit with its laws to the rig as the files have it: no fit is
+/// told that belongs to a rig in no file.
+void describe(const DiagnoseProblem& problem, const FilesToFit& files, const Trial& baseline, const SearchLimits& limits, FoundSet& e, Diagnosis& d);
 
 /// The effects of the best set, with their parameters.
 std::vector<MissingEffect> effects_of(const FoundSet& found, const Rig& rig, const Diagnosis& d);

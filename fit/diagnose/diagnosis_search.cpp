@@ -11,6 +11,7 @@
 #include "fit/diagnose/diagnosis_description.h"
 #include "fit/diagnose/reliability.h"
 #include "fit/fit_description.h"
+#include "fit/givens/stated_numbers.h"
 #include "fit/search/decays_first.h"
 #include "fit/search/noise_of_trial.h"
 
@@ -19,13 +20,6 @@ namespace {
 
 using Eigen::Index;
 
-FitProblem as_filed(const DiagnoseProblem& problem) {
-  FitProblem files;
-  files.rig = problem.rig;
-  files.runs = problem.runs;
-  files.circulation = problem.circulation;
-  return files;
-}
 
 /// So short that nothing missing could be seen: "nothing is missing" would be no answer.
 void refuse_short_runs(const JointProblem& joint) {
@@ -34,6 +28,16 @@ void refuse_short_runs(const JointProblem& joint) {
   for (const Unknown& u : joint.unknowns()) variables += u.held ? 0 : 1;
   for (const RunResidual& run : joint.runs()) observations += run.observations(), variables += run.linear_unknowns();
   if (const std::string why = too_few_samples(observations, variables); !why.empty()) throw NoAnswer(why);
+}
+
+FilesToFit files_to_fit(const DiagnoseProblem& problem) {
+  FitProblem files;
+  files.rig = problem.rig;
+  files.runs = problem.runs;
+  files.circulation = problem.circulation;
+  if (!states_errors(problem.rig, problem.runs)) return {std::move(files), problem.heldout, {}};
+  if (problem.progress) problem.progress("looking at the stated uncertainties");
+  return with_numbers_as_parameters(files, problem.heldout, fit_baseline(files).arrival);
 }
 
 Trial fit_with_nothing_missing(const DiagnoseProblem& problem, const FitProblem& files) {
@@ -85,15 +89,15 @@ std::unique_ptr<ExactModel> held_against(const HiddenLaw& hidden, const FitProbl
 
 }  // namespace
 
-DiagnosisSearch::DiagnosisSearch(const DiagnoseProblem& problem, bool numbers_known)
+DiagnosisSearch::DiagnosisSearch(const DiagnoseProblem& problem)
     : problem_(problem),
-      numbers_known_(numbers_known),
+      numbers_stated_(states_errors(problem.rig, problem.runs)),
       may_find_laws_(problem.laws && problem.effects.empty()),
       limits_(problem),
-      fit_problem_(as_filed(problem)),
+      files_(files_to_fit(problem)),
       baseline_(fit_with_nothing_missing(problem, fit_problem_)),
       mismatch_(locate_mismatch(baseline_.arrival.joint)),
-      asked_beside_(numbers_known),
+      asked_beside_(numbers_stated_),
       description_beside_(problem),
       found_{files(), baseline_, 0, {}, {}, false} {}
 
@@ -120,7 +124,7 @@ void DiagnosisSearch::ask_about_noise() {
 /// What is far from explained by a step in the numbers is asked about last (weigh_description).
 void DiagnosisSearch::ask_about_description() {
   const double above_noise = std::max(nearly_explained, baseline_.reduced_chi2()) - 1, far_away = 1 - (nearly_explained - 1) / above_noise;
-  if (mismatch_.found && !numbers_known_) limits_.spend([&] { description_ = describe_rig(problem_, baseline_, std::max(half_of_it, far_away)); });
+  if (mismatch_.found && !numbers_stated_) limits_.spend([&] { description_ = describe_rig(problem_, baseline_, std::max(half_of_it, far_away)); });
   if (description_ && description_->from)  // noise of a colour is the answer where effects have no better one
     limits_.spend([&] {
       if (effects_beat_noise(problem_, fit_problem_, baseline_, *description_->from)) description_.reset();
@@ -155,7 +159,7 @@ bool DiagnosisSearch::noise_or_rig_explain(const Trial& set) {
   FoundSet with = laws_beside(*rig, problem_, files(), baseline_, *selection_, &set);
   if (!with.explains()) return false;
   description_ = rig;
-  with.setting = {description_->problem.get(), &description_->heldout};
+  with.setting = description_->setting();
   beside_description_ = std::move(with);
   return true;
 }
@@ -245,7 +249,7 @@ void DiagnosisSearch::look_for_effects() {
 }
 
 void DiagnosisSearch::weigh_description() {
-  if (mismatch_.found && !numbers_known_ && !description_ && !found_.explains()) limits_.spend([&] { description_ = describe_rig(problem_, baseline_); });
+  if (mismatch_.found && !numbers_stated_ && !description_ && !found_.explains()) limits_.spend([&] { description_ = describe_rig(problem_, baseline_); });
   if (take_noise_of_description()) begin_selection();
   described_ = description_ && unrig::weigh_description(problem_, files(), baseline_, *description_, std::move(beside_description_), *selection_, limits_, found_);
   if (described_ && laws_) {
@@ -309,11 +313,11 @@ Diagnosis DiagnosisSearch::told() {
   if (!problem_.verdict_only) {
     tell("describing the result");
     d.maps = residual_maps(baseline_.arrival.joint, mismatch_.runs);
-    describe(fit_problem_, baseline_, limits_, found_, d);
+    describe(problem_, files_, baseline_, limits_, found_, d);
     for (const ImprovedRun& run : found_.unseen) d.runs.push_back(run);
     if (d.unexplained) d.missing_force = missing_forces(found_.best.arrival.joint);
   } else if (!found_.best.effects.empty()) {
-    found_.fit = fit_with(found_, limits_);
+    tell_fit(problem_, files_, limits_, found_);
   }
   if (!d.not_followed.empty()) d.search = SearchOutcome::failed;
   tell_missing(d);

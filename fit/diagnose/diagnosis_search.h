@@ -12,6 +12,7 @@
 #include "fit/diagnose/rig_description.h"
 #include "fit/diagnose/search_limits.h"
 #include "fit/diagnose/selection.h"
+#include "fit/givens/number_parameters.h"
 #include "fit/search/effect_search.h"
 
 namespace unrig {
@@ -20,8 +21,8 @@ namespace unrig {
 /// be found.
 class DiagnosisSearch {
  public:
-  /// The best fit with nothing missing. `numbers_known`: what the files state of their uncertainty has been allowed for. Looks at the problem as long as it lives. Throws NoAnswer where the runs are too short for any.
-  DiagnosisSearch(const DiagnoseProblem& problem, bool numbers_known);
+  /// The best fit with nothing missing; numbers of the files that state an uncertainty are parameters of it and of every other. Looks at the problem as long as it lives. Throws NoAnswer where the runs are too short for any.
+  explicit DiagnosisSearch(const DiagnoseProblem& problem);
   DiagnosisSearch(const DiagnosisSearch&) = delete;
   DiagnosisSearch& operator=(const DiagnosisSearch&) = delete;
 
@@ -46,7 +47,7 @@ class DiagnosisSearch {
   void tell(const char* what) const {
     if (problem_.progress) problem_.progress(what);
   }
-  Setting files() const { return {&fit_problem_, &problem_.heldout}; }
+  Setting files() const { return {&fit_problem_, &files_.heldout}; }
   void begin_selection();
   bool take_noise_of_description();
   void begin_anew_in_noise_of(Trial set);
@@ -59,10 +60,11 @@ class DiagnosisSearch {
   void tell_missing(Diagnosis& d);
 
   const DiagnoseProblem& problem_;
-  const bool numbers_known_, may_find_laws_;
+  const bool numbers_stated_, may_find_laws_;
   const std::chrono::steady_clock::time_point begin_ = std::chrono::steady_clock::now();
   SearchLimits limits_;
-  FitProblem fit_problem_;  // rig and runs as the files have them
+  FilesToFit files_;
+  FitProblem& fit_problem_ = files_.problem;
   Trial baseline_;
   Mismatch mismatch_;
   bool in_colour_ = false;             // noise of a colour was taken for the baseline's

@@ -1,4 +1,6 @@
 #pragma once
+#include <Eigen/Core>
+#include <memory>
 #include <string>
 #include <vector>
 
@@ -11,6 +13,7 @@ namespace unrig {
 struct Setting {
   const FitProblem* problem;
   const std::vector<Run>* heldout;
+  Eigen::VectorXd off = {};  ///< of the description, in standard deviations of the errors of its numbers (with_errors_of_files); empty of the files
 };
 
 /// The best set of laws in a setting, and what is to be said of it.
@@ -22,6 +25,7 @@ struct FoundSet {
   std::vector<ImprovedRun> unseen;
   bool predicts = false;
   FitResult fit = {};
+  std::shared_ptr<const FitProblem> fitted = {};  ///< by `fit`, where it found numbers of the files too; else those of the setting
 
   bool clean() const { return !remaining.found; }
   bool explains() const { return clean() && predicts; }

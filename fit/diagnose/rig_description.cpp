@@ -20,28 +20,17 @@ namespace {
 using Eigen::Index;
 using Eigen::VectorXd;
 
-/// Rig and runs that state what is usual.
-FitProblem with_usual_errors(const DiagnoseProblem& problem) {
-  FitProblem usual;
-  usual.rig = problem.rig;
-  usual.rig.givens = std::make_shared<const Givens>(usual_errors(problem.rig));
-  usual.runs = problem.runs;
-  usual.circulation = problem.circulation;
-  for (Run& run : usual.runs) run.givens = std::make_shared<const Givens>(usual_errors(run));
-  return usual;
-}
-
 /// Runs that took no part, with the errors that all runs share.
-std::vector<Run> moved_heldout(const DiagnoseProblem& problem, const FitProblem& usual, const VectorXd& z) {
-  std::vector<Run> all = usual.runs, moved;
+std::vector<Run> moved_heldout(const DiagnoseProblem& problem, const FitProblem& errors, const VectorXd& z) {
+  std::vector<Run> all = errors.runs, moved;
   for (const Run& run : problem.heldout) {
     all.push_back(run);
-    all.back().givens = std::make_shared<const Givens>(usual_errors(run));
+    if (!states_errors(problem.rig, problem.runs)) all.back().givens = std::make_shared<const Givens>(usual_errors(run));
   }
-  const StatedNumbers numbers(usual.rig, all);
+  const StatedNumbers numbers(errors.rig, all);
   VectorXd known = VectorXd::Zero(numbers.deviations());
   known.head(z.size()) = z;
-  for (std::size_t i = usual.runs.size(); i < all.size(); ++i) {
+  for (std::size_t i = errors.runs.size(); i < all.size(); ++i) {
     moved.push_back(numbers.run_at(i, known));
     moved.back().givens = nullptr;
   }
@@ -83,15 +72,26 @@ std::optional<RigDescription> in_the_noise_behind_a_step(const DiagnoseProblem& 
 
 }  // namespace
 
-MissingEffect RigDescription::as_missing() const {
+FitProblem with_errors_of_files(const DiagnoseProblem& problem) {
+  FitProblem errors;
+  errors.rig = problem.rig;
+  errors.runs = problem.runs;
+  errors.circulation = problem.circulation;
+  errors.progress = problem.progress;
+  if (states_errors(problem.rig, problem.runs)) return errors;
+  errors.rig.givens = std::make_shared<const Givens>(usual_errors(problem.rig));
+  for (Run& run : errors.runs) run.givens = std::make_shared<const Givens>(usual_errors(run));
+  return errors;
+}
+
+MissingEffect as_missing(std::vector<FittedGiven> numbers) {
   constexpr std::size_t most = 5;
   const auto shift = [](const FittedGiven& given) { return std::abs(given.value - given.stated) / given.stated_std; };
-  std::vector<FittedGiven> by_shift = numbers;
-  std::stable_sort(by_shift.begin(), by_shift.end(), [&](const FittedGiven& a, const FittedGiven& b) { return shift(a) > shift(b); });
+  std::stable_sort(numbers.begin(), numbers.end(), [&](const FittedGiven& a, const FittedGiven& b) { return shift(a) > shift(b); });
   MissingEffect missing{rig_description_id, 0, "the rig file or a run's head is off", "", {}, ""};
   std::set<std::string> named;  // the runs share the errors of their heads
   std::vector<std::string> statements;
-  for (const FittedGiven& given : by_shift) {
+  for (const FittedGiven& given : numbers) {
     if (missing.parameters.size() == most || (!missing.parameters.empty() && shift(given) < 1)) break;
     if (!named.insert(given.name).second) continue;
     FittedParameter p;
@@ -119,10 +119,10 @@ double change_of_load(const FitProblem& from, const FitResult& before, const Fit
 
 std::optional<RigDescription> describe_rig(const DiagnoseProblem& problem, const Trial& from, double least) {
   if (problem.progress) problem.progress("looking at the rig's description");
-  FitProblem usual = with_usual_errors(problem);
-  usual.effects = from.effects;
-  usual.rig.laws = from.arrival.model->rig().laws;
-  InexactRig inexact(usual);
+  FitProblem errors = with_errors_of_files(problem);
+  errors.effects = from.effects;
+  errors.rig.laws = from.arrival.model->rig().laws;
+  InexactRig inexact(errors);
   Arrival arrival = from.arrival;
   double freedom = 0;
   for (RunResidual& run : arrival.joint.runs()) {
@@ -141,10 +141,10 @@ std::optional<RigDescription> describe_rig(const DiagnoseProblem& problem, const
   auto moved = std::make_shared<FitProblem>();
   moved->rig = inexact.rig();
   moved->runs = inexact.runs();
-  moved->circulation = usual.circulation;
+  moved->circulation = errors.circulation;
   moved->rig.givens = nullptr;
   for (Run& run : moved->runs) run.givens = nullptr;
-  RigDescription description{moved, moved_heldout(problem, usual, inexact.deviations()), fit_baseline(*moved), promised, arrival.joint.chi2() / freedom, inexact.cost_of_deviations(arrival), inexact.numbers(), {}};
+  RigDescription description{moved, moved_heldout(problem, errors, inexact.deviations()), fit_baseline(*moved), promised, arrival.joint.chi2() / freedom, inexact.cost_of_deviations(arrival), inexact.numbers(), inexact.deviations(), {}};
   take_noise_of(description.trial, from);
   const Eigen::MatrixXd& spread = inexact.stated_numbers().spread();
   const Eigen::MatrixXd covariance = spread * inexact.uncertainty(arrival).of_deviations * spread.transpose();

@@ -5,11 +5,15 @@
 #include <vector>
 
 #include "fit/diagnose/diagnose.h"
+#include "fit/diagnose/explanation.h"
 #include "fit/search/effect_search.h"
 
 namespace unrig {
 
-/// The rig file and the heads of the runs as a candidate for what a baseline leaves: their numbers off by what is usual where nobody states it (core/rig/default_errors.h).
+/// Rig and runs with the errors that their numbers may have: those that rig file and heads state or, where none of them states any, the usual ones (core/rig/default_errors.h).
+FitProblem with_errors_of_files(const DiagnoseProblem& problem);
+
+/// The rig file and the heads of the runs as a candidate for what a baseline leaves: their numbers within the errors that they may have.
 struct RigDescription {
   std::shared_ptr<const FitProblem> problem;  ///< rig and runs as they come out; `trial` looks at them
   std::vector<Run> heldout;                   ///< likewise
@@ -18,11 +22,15 @@ struct RigDescription {
   double left = 0;                            ///< reduced chi-square of the fit that the numbers were found with, laws included
   double cost = 0;                            ///< z^T z + ln det(I + K), to be added to a difference of BIC
   std::vector<FittedGiven> numbers;           ///< all of them, with their errors
+  Eigen::VectorXd deviations;                 ///< of the errors of the files, at which they stand
   std::optional<Trial> from;                  ///< what it was asked of, in the noise that it left, where that has a colour
 
-  /// As something missing. Its parameters are the numbers that moved most in units of the usual error, those by one standard deviation or more: five at most, one at least; `start` is what the file says.
-  MissingEffect as_missing() const;
+  Setting setting() const { return {problem.get(), &heldout, deviations}; }
+
 };
+
+/// The description as something missing. Its parameters are the `numbers` that moved most in units of the usual error, those by one standard deviation or more: five at most, one at least; `start` is what the file says.
+MissingEffect as_missing(std::vector<FittedGiven> numbers);
 
 /// Parameters and numbers together, from a fit of the rig, with laws or without:
 ///

@@ -24,7 +24,7 @@ std::string label(const FittedGiven& given) { return given.run.empty() ? given.n
 
 }  // namespace
 
-InexactRig::InexactRig(const FitProblem& stated) : stated_(&stated), numbers_(stated.rig, stated.runs), z_(VectorXd::Zero(numbers_.deviations())) {}
+InexactRig::InexactRig(const FitProblem& stated, VectorXd off) : stated_(&stated), numbers_(stated.rig, stated.runs), z_(off.size() > 0 ? std::move(off) : VectorXd::Zero(numbers_.deviations())) {}
 
 InexactRig::Step InexactRig::next_step(const Arrival& arrival) const {
   const JointInformation information = joint_information(arrival.joint, *slopes_);
@@ -89,12 +89,8 @@ Arrival InexactRig::after_the_promised_step(const Arrival& arrival) {
 }
 
 double InexactRig::cost_of_deviations(const Arrival& arrival) const {
-  const JointInformation information = joint_information(arrival.joint, *slopes_);
-  const auto count = static_cast<Index>(information.free.size()), deviations = z_.size();
-  const VectorXd scale = information.of_data.diagonal().head(count).cwiseMax(1e-300).cwiseSqrt().cwiseInverse();
-  const MatrixXd of_parameters = scale.asDiagonal() * information.of_data.topLeftCorner(count, count) * scale.asDiagonal(), with = scale.asDiagonal() * information.of_data.topRightCorner(count, deviations);
-  const MatrixXd left = information.of_data.bottomRightCorner(deviations, deviations) - with.transpose() * of_parameters.ldlt().solve(with);
-  const VectorXd known = Eigen::SelfAdjointEigenSolver<MatrixXd>(left).eigenvalues().cwiseMax(0);  // rounding takes those of what nothing tells below zero
+  const MatrixXd told = told_of_deviations(joint_information(arrival.joint, *slopes_), z_.size());
+  const VectorXd known = Eigen::SelfAdjointEigenSolver<MatrixXd>(told).eigenvalues().cwiseMax(0);  // rounding takes those of what nothing tells below zero
   return z_.squaredNorm() + known.array().log1p().sum();
 }
 
@@ -113,12 +109,12 @@ std::vector<FittedGiven> InexactRig::numbers() const {
 
 void InexactRig::search(Arrival& arrival, double worth) {
   constexpr int most = 12, most_halvings = 6;
-  constexpr double near = 0.05;
+  constexpr double near = 0.05, hardly = 1.0 / 3;
   const auto tell = [&](const std::string& what) {
     if (stated_->progress) stated_->progress(what);
   };
   for (int round = 0; round < most; ++round) {
-    tell("looking at the stated uncertainties");
+    tell("looking at the numbers of rig file and heads");
     slopes_ = number_slopes(arrival, numbers_, z_);  // anew: masses and stiffness move the runs alike to one part in thousands, and so must their slopes agree
     const Step step = next_step(arrival);
     const double promised = step.length * step.length, excess = arrival.joint.chi2() * (1 - 1 / arrival.reduced_chi2());
@@ -137,6 +133,7 @@ void InexactRig::search(Arrival& arrival, double worth) {
       } catch (const std::invalid_argument&) {  // no rig has such numbers
       }
     }
+    if (!better && step.length < hardly) return;  // searches along laws with corners know chi-square no better
     if (!better) break;
   }
   arrival.converged = false;

@@ -16,17 +16,17 @@ namespace unrig {
 ///   chi-square(theta, g) + sum over numbers ((g - stated) / std)^2,
 ///
 /// the numbers by way of their independent deviations z (fit/givens/stated_numbers.h). Gauss-Newton steps in both, the rig made anew at each g and theta fitted to it, until the next step is shorter
-/// than 0.05 of its own standard deviations.
+/// than 0.05 of its own standard deviations, or than a third and of no use.
 class InexactRig {
  public:
-  /// `stated` must outlive this.
-  explicit InexactRig(const FitProblem& stated);
+  /// `stated` must outlive this. The numbers begin as they are stated or, where `off` is not empty, as many standard deviations off.
+  explicit InexactRig(const FitProblem& stated, Eigen::VectorXd off = {});
 
   /// How far chi-square + z^T z would fall by one step in parameters and deviations from a fit at the present numbers, were both linear.
   double promises(const Arrival& arrival);
   /// The fit at the numbers that this step leads to, theta at its best there. This object stays where it is; it keeps the runs.
   Arrival after_the_promised_step(const Arrival& arrival);
-  /// From a fit at the present numbers (at first the stated ones) to the best of both. The runs of `arrival` are this object's from then on. It ends, too, where a step promises
+  /// From a fit at the present numbers to the best of both. The runs of `arrival` are this object's from then on. It ends, too, where a step promises
   /// less than `worth` of what is left above the noise.
   void search(Arrival& arrival, double worth = 0);
 
@@ -62,7 +62,7 @@ class InexactRig {
   const FitProblem* stated_;
   StatedNumbers numbers_;
   Eigen::VectorXd z_;
-  std::shared_ptr<const FitProblem> problem_;  ///< at z_; none while they are the stated ones
+  std::shared_ptr<const FitProblem> problem_;  ///< at z_; none before the first step
   std::shared_ptr<const FitProblem> one_step_;  ///< behind after_the_promised_step
   std::optional<NumberSlopes> slopes_;
 };

@@ -15,6 +15,8 @@ struct JointInformation {
   Eigen::VectorXd downhill;
 };
 JointInformation joint_information(const JointProblem& joint, const NumberSlopes& slopes);
+/// What they say of so many deviations with the unknowns eliminated.
+Eigen::MatrixXd told_of_deviations(const JointInformation& information, Eigen::Index deviations);
 
 /// Of unknowns and offsets, and of the deviations of stated numbers beside them.
 struct InexactUncertainty {

@@ -22,6 +22,14 @@ double prior_width(double value) { return std::max(0.5 * std::abs(value), 0.05);
 
 }  // namespace
 
+ResidualTerm what_is_known(std::size_t index, const Parameter& p) {
+  return {{index}, 1, [centre = p.start, width = p.known_to](const VectorXd& value, VectorXd& residual, MatrixXd* jacobian) {
+            residual[0] = (value[0] - centre) / width;
+            if (jacobian != nullptr) (*jacobian)(0, 0) = 1 / width;
+            return true;
+          }};
+}
+
 ResidualTerm weak_prior(std::size_t index, const LeastSquaresUnknown& u) {
   const double centre = std::clamp(u.value, u.lower, u.upper), width = prior_width(centre);
   return {{index}, 1, [centre, width](const VectorXd& value, VectorXd& residual, MatrixXd* jacobian) {
@@ -100,12 +108,16 @@ LeastSquaresProblem JointProblem::least_squares() const {
     problem.terms.push_back(std::move(term));
     problem.degrees_of_freedom += static_cast<double>(runs_[r].degrees_of_freedom());
   }
-  for (const Unknown& u : unknowns_) problem.degrees_of_freedom -= u.held ? 0 : 1;
+  for (std::size_t i = 0; i < unknowns_.size(); ++i) {
+    problem.degrees_of_freedom -= unknowns_[i].held ? 0 : 1;
+    if (std::isfinite(parameter(unknowns_[i]).known_to)) problem.terms.push_back(what_is_known(i, parameter(unknowns_[i])));
+  }
   return problem;
 }
 
 JointProblem::Summary JointProblem::solve(const SolveOptions& options) {
   LeastSquaresProblem problem = least_squares();
+  problem.terms.insert(problem.terms.end(), options.beside.begin(), options.beside.end());
   for (std::size_t i = 0; options.prior && i < unknowns_.size(); ++i) {
     if (!unknowns_[i].held) problem.terms.push_back(weak_prior(i, problem.unknowns[i]));
   }
@@ -139,15 +151,17 @@ JointProblem::Summary JointProblem::solve(const SolveOptions& options) {
 }
 
 double JointProblem::Linearisation::chi2() const {
-  double sum = 0;
-  for (double x : run_chi2) sum += x;
-  return sum;
+  return std::accumulate(run_chi2.begin(), run_chi2.end(), beside_runs);
 }
 
 JointProblem::Linearisation JointProblem::linearise() const {
   const auto count = static_cast<Index>(unknowns_.size()), rows = static_cast<Index>(model_->parameters().size()) + 1;
   Linearisation lin;
-  lin.residual.setZero(rows * static_cast<Index>(runs_.size()));
+  std::vector<Index> known;  // beside the runs
+  for (Index i = 0; i < count; ++i)
+    if (std::isfinite(parameter(unknowns_[static_cast<std::size_t>(i)]).known_to)) known.push_back(i);
+  const Index of_runs = rows * static_cast<Index>(runs_.size());
+  lin.residual.setZero(of_runs + static_cast<Index>(known.size()));
   lin.jacobian = MatrixXd::Zero(lin.residual.size(), count);
   lin.run_chi2.resize(runs_.size());
   in_parallel(runs_.size(), [&](std::size_t r) {
@@ -161,13 +175,27 @@ JointProblem::Linearisation JointProblem::linearise() const {
     }
     lin.run_chi2[r] = e.chi2;
   });
+  for (std::size_t k = 0; k < known.size(); ++k) {
+    const Unknown& u = unknowns_[static_cast<std::size_t>(known[k])];
+    const Parameter& p = parameter(u);
+    lin.residual[of_runs + static_cast<Index>(k)] = (u.value - p.start) / p.known_to;
+    lin.jacobian(of_runs + static_cast<Index>(k), known[k]) = 1 / p.known_to;
+  }
+  lin.beside_runs = beside_runs();
+  lin.beside_runs_rows = static_cast<Index>(known.size());
   return lin;
 }
 
 double JointProblem::chi2() const {
   std::vector<double> of_run(runs_.size());
   in_parallel(runs_.size(), [&](std::size_t r) { of_run[r] = runs_[r].is_aside() ? 0 : runs_[r].evaluate(theta(r), Partials::none).chi2; });
-  return std::accumulate(of_run.begin(), of_run.end(), 0.0);
+  return std::accumulate(of_run.begin(), of_run.end(), beside_runs());
+}
+
+double JointProblem::beside_runs() const {
+  double sum = 0;
+  for (const Unknown& u : unknowns_) sum += std::pow((u.value - parameter(u).start) / parameter(u).known_to, 2);
+  return sum;
 }
 
 }  // namespace unrig

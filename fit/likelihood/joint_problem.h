@@ -18,6 +18,9 @@ struct Unknown {
   std::string why_held;  ///< for the person who reads the report
 };
 
+/// What is known of unknown `index` beside the runs: (value - start) / known_to.
+ResidualTerm what_is_known(std::size_t index, const Parameter& parameter);
+
 /// Holds unknown `index` weakly near its present value, while the data determine only some of them.
 ResidualTerm weak_prior(std::size_t index, const LeastSquaresUnknown& unknown);
 
@@ -49,6 +52,7 @@ class JointProblem {
     int most_evaluations = 400;
     double enough = 0;        ///< reduced chi-square with which the search ends wherever it stands
     Goal goal = {};           ///< beyond whose reach it ends
+    std::vector<ResidualTerm> beside = {};  ///< the runs
   };
   struct Summary {
     bool converged = false;
@@ -67,17 +71,20 @@ class JointProblem {
   /// "normal_force_slope (step_a.csv)": a parameter, and the run it belongs to.
   std::string name(const Unknown& unknown) const;
 
-  /// Residual and Jacobian of all runs at the present values, one column per unknown (held ones too).
+  /// Residual and Jacobian of all runs at the present values, one column per unknown (held ones too); behind them of what is known of parameters.
   struct Linearisation {
     Eigen::VectorXd residual;
     Eigen::MatrixXd jacobian;
     std::vector<double> run_chi2;
+    double beside_runs = 0;               ///< the part of chi-square that is no run's
+    Eigen::Index beside_runs_rows = 0;    ///< its rows, the last
     double chi2() const;
   };
   Linearisation linearise() const;
 
-  /// chi-square at the present values.
+  /// chi-square at the present values, and its part that is no run's: what is known of parameters (Parameter::known_to).
   double chi2() const;
+  double beside_runs() const;
 
  private:
   const AeroelasticModel* model_;

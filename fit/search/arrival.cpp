@@ -213,9 +213,10 @@ bool back_to_the_rig(JointProblem& joint, double factor) {
   const VectorXd rig = joint.model().start_values();
   bool any = false;
   for (Unknown& u : joint.unknowns()) {
+    const Parameter& p = joint.parameter(u);
     const double there = rig[u.parameter];
-    const bool near = u.value > there / factor && u.value < factor * there;
-    if (u.held || u.run >= 0 || !(there > 0) || near || !joint.parameter(u).effect.empty()) continue;
+    const bool known = std::isfinite(p.known_to), near = known ? std::abs(u.value - there) < factor * p.known_to : u.value > there / factor && u.value < factor * there;
+    if (u.held || u.run >= 0 || !(known || there > 0) || near || !p.effect.empty()) continue;
     u.value = there;
     any = true;
   }

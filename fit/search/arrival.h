@@ -54,7 +54,7 @@ void refine(Arrival& arrival, const FitProblem& problem);
 void look_elsewhere(Arrival& arrival);
 
 
-/// A fit that cannot follow leaves parameters far from the truth: the rig's own that are further than `factor` from their first values go back there. Whether any did.
+/// A fit that cannot follow leaves parameters far from the truth: the rig's own that are further than `factor` from their first values, or than so many standard deviations of what is known of them, go back there. Whether any did.
 /// A parameter of a single run (the normal-force slope, which falls to half in stall) stays.
 bool back_to_the_rig(JointProblem& joint, double factor);
 

@@ -150,20 +150,27 @@ class GrowingTrust {
       constexpr double share = 0.5, hardly = 1e-9;
       const VectorXd now = values();
       const VectorXd size = sizes(now);
-      for (Index i = 0; i < count; ++i) rows(count * runs + i, i) = size[i] > 0 ? 1 / (share * size[i]) : hardly * rows.col(i).norm() + 1e-300;
+      for (Index i = 0; i < count; ++i) {
+        const Parameter& p = parameter(i);
+        if (std::isfinite(p.known_to)) right[count * runs + i] = (p.start - now[i]) / p.known_to;
+        rows(count * runs + i, i) = std::isfinite(p.known_to) ? 1 / p.known_to : size[i] > 0 ? 1 / (share * size[i]) : hardly * rows.col(i).norm() + 1e-300;
+      }
       set(within_reach(now, now + rows.colPivHouseholderQr().solve(right)));
       change = values() - now;
     }
     in_parallel(decays_.size(), [&](std::size_t d) { smoothers_[d].step(change); });
   }
 
+  const Parameter& parameter(Index i) const { return joint_.parameter(joint_.unknowns()[free_[static_cast<std::size_t>(i)]]); }
   Effect::Band bounds(Index i, double now) const { return bounds_at(joint_.model(), joint_.unknowns()[free_[static_cast<std::size_t>(i)]].parameter, now); }
 
-  /// What theta is told in units of: itself; of what may have either sign at least what it began with, for on its way through zero it has none.
+  /// What theta is told in units of: itself; of what may have either sign at least what it began with, for on its way through zero it has none; at least to what it is known beside the runs.
   VectorXd sizes(const VectorXd& now) const {
     VectorXd size = now.cwiseAbs();
-    for (Index i = 0; i < now.size(); ++i)
+    for (Index i = 0; i < now.size(); ++i) {
       if (bounds(i, now[i]).first < 0) size[i] = std::max(size[i], std::abs(begun_[i]));
+      if (std::isfinite(parameter(i).known_to)) size[i] = std::max(size[i], parameter(i).known_to);
+    }
     return size;
   }
 
@@ -221,6 +228,8 @@ class Decays {
       problem_.unknowns.push_back({joint.name(u), u.value, lower, upper, false, 0});
     }
     for (std::size_t d = 0; d < decays_.size(); ++d) add(decays_[d], linear[d]);
+    for (std::size_t i = 0; i < free_.size(); ++i)
+      if (const Parameter& p = joint.parameter(joint.unknowns()[free_[i]]); std::isfinite(p.known_to)) problem_.terms.push_back(what_is_known(i, p));
   }
 
   /// Over the whole records at once (`growth` 0), or over records that grow by this factor from a few samples. False where it gave up: `lost` times the noise's

@@ -77,7 +77,8 @@ Index FirstOrder::further_states(std::size_t run, const std::vector<Index>& own,
 /// In [unknowns of the fit | the effect's own | further states, run by run].
 LinearStep FirstOrder::step(const std::vector<Unknown>& of_effect, const std::vector<Index>& own, const std::vector<Beside>& rows) const {
   const auto known = static_cast<Index>(joint_.unknowns().size());
-  Index height = 0, column = known + static_cast<Index>(of_effect.size()), width = column;
+  const auto is_known = [&](const Unknown& u) { return std::isfinite(joint_.parameter(u).known_to); };
+  Index height = std::count_if(joint_.unknowns().begin(), joint_.unknowns().end(), [&](const Unknown& u) { return !u.held && is_known(u); }), column = known + static_cast<Index>(of_effect.size()), width = column;
   for (std::size_t r = 0; r < rows.size(); ++r) {
     height += rows[r].left.size();
     width += further_states(r, own, rows[r]);
@@ -98,6 +99,13 @@ LinearStep FirstOrder::step(const std::vector<Unknown>& of_effect, const std::ve
     for (Index k = 0; k < states; ++k) put(column++, parameters + static_cast<Index>(own.size()) + k);
     left.segment(row, length) = rows[r].left;
     row += length;
+  }
+  for (Index k = 0; k < known; ++k) {
+    const Unknown& u = joint_.unknowns()[static_cast<std::size_t>(k)];
+    if (u.held || !is_known(u)) continue;
+    const Parameter& p = joint_.parameter(u);
+    slopes(row, k) = 1 / p.known_to;
+    left[row++] = (p.start - u.value) / p.known_to;
   }
   return linear_step(slopes, left);
 }

@@ -35,7 +35,7 @@ void search_alone(JointProblem& alone) {
 }
 
 /// Whether the rig's own parameters have gone astray; then they are back where the rig file has them.
-bool back_at_the_rig(JointProblem& alone) {
+bool start_at_the_rig(JointProblem& alone) {
   constexpr double astray = 2;
   const Eigen::VectorXd start = alone.model().start_values();
   bool any = false;
@@ -56,7 +56,7 @@ JointProblem fitted_alone(const JointProblem& joint, std::size_t r) {
   JointProblem alone = there;
   search_alone(alone);
   const bool dear = there.runs().front().takes_small_steps(there.theta(0));  // a search under a gap goes from afar as it is
-  if (dear || alone.chi2() < nearly_explained * static_cast<double>(alone.runs().front().degrees_of_freedom()) || !back_at_the_rig(there)) return alone;
+  if (dear || alone.chi2() < nearly_explained * static_cast<double>(alone.runs().front().degrees_of_freedom()) || !start_at_the_rig(there)) return alone;
   search_alone(there);
   return there.chi2() < alone.chi2() ? there : alone;
 }

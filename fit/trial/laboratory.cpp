@@ -50,17 +50,17 @@ template <typename Deviation>
 VectorXd errors_of(const Givens& givens, const std::string& group, Deviation deviation) {
   VectorXd deviations = VectorXd::Zero(givens.deviations());
   for (std::size_t k = 0; k < givens.group.size(); ++k)
-    if (givens.group[k] == group) deviations[static_cast<Index>(k)] = deviation();
+    if (group == as_stated || givens.group[k] == group) deviations[static_cast<Index>(k)] = deviation();
   return givens.spread * deviations;
 }
 
-/// Rig or run with errors of the usual size.
+/// Rig or run with errors of the usual size, which it states where all of its numbers have them.
 template <typename File, typename Deviation>
 File read_with_errors(File file, const std::string& group, Deviation deviation) {
   const auto usual = std::make_shared<const Givens>(usual_errors(file));
   const std::shared_ptr<const Givens> stated = std::exchange(file.givens, usual);
   File off = with_errors(file, errors_of(*usual, group, deviation));
-  off.givens = stated;
+  off.givens = group == as_stated ? std::make_shared<const Givens>(usual_errors(off)) : stated;
   return off;
 }
 
@@ -91,7 +91,8 @@ Laboratory draw_laboratory(const Rig& rig, const std::vector<Run>& runs, Random&
     groups.insert(of_run.group.begin(), of_run.group.end());
   }
   const auto which = std::uniform_int_distribution<std::size_t>(0, groups.size() - 1)(random);
-  if (off) laboratory.misread = *std::next(groups.begin(), static_cast<std::ptrdiff_t>(which));
+  const bool stated = std::bernoulli_distribution(0.5)(random);
+  if (off) laboratory.misread = stated ? as_stated : *std::next(groups.begin(), static_cast<std::ptrdiff_t>(which));
   return laboratory;
 }
 

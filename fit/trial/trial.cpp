@@ -260,11 +260,13 @@ namespace {
 
 /// Whether a set is exactly what was hidden; beside it, where files are misread, the rig's description may be.
 bool is_hidden(Strings set, const TrialOutcome& o) {
-  if (!o.misread.empty()) std::erase(set, rig_description_id);
+  if (o.may_name_description()) std::erase(set, rig_description_id);
   return name_of(set) == name_of(o.hidden);
 }
 
 }  // namespace
+
+bool TrialOutcome::may_name_description() const { return !misread.empty() && misread != as_stated; }
 
 bool TrialOutcome::right() const { return failure.empty() && is_hidden(found, *this); }
 
@@ -273,7 +275,7 @@ bool TrialOutcome::held() const {
 }
 
 bool TrialOutcome::false_name() const {
-  return std::any_of(found.begin(), found.end(), [&](const std::string& id) { return !has(hidden, id) && !(id == rig_description_id && !misread.empty()); });
+  return std::any_of(found.begin(), found.end(), [&](const std::string& id) { return !has(hidden, id) && !(id == rig_description_id && may_name_description()); });
 }
 
 void tally(TrialResult& result) {

@@ -51,7 +51,7 @@ struct TrialOutcome {
   double size = 0;             ///< largest r.m.s. of a run that the hidden effects make, over the noise
   std::vector<double> sizes;   ///< of each hidden effect by itself, in the order of `hidden`
   std::string noise;           ///< kind of the gauge's noise
-  std::string misread;         ///< group of the numbers by which the files are off; empty: none
+  std::string misread;         ///< group of the numbers by which the files are off (Laboratory::misread); empty: none
   std::optional<double> probability;  ///< that the diagnosis gives what it found; none where nothing is named
   std::vector<std::vector<std::string>> explanations;  ///< effects of Diagnosis::explanations
   std::vector<NamedParameter> named;  ///< those with a standard error whose truth does not lie on a bound, where no interval has two sides
@@ -61,7 +61,8 @@ struct TrialOutcome {
   bool stopped = false;          ///< Diagnosis::stopped
   std::string failure;         ///< what the diagnosis threw, if it did
 
-  bool right() const;          ///< exactly what was hidden was found; beside it, where files are misread, the rig's description may be
+  bool may_name_description() const;  ///< files are misread, and do not state it
+  bool right() const;          ///< exactly what was hidden was found; beside it the rig's description, where it may be
   bool false_name() const;     ///< something was found that was not there
   bool held() const;           ///< what was hidden is among the explanations, or something else is
 };

@@ -35,7 +35,7 @@ int trial_command(int argc, char** argv) {
   app.add_flag("--outside", problem.outside, "keep what is hidden from the candidates: the right verdict is `unexplained`; with --law, hide laws that the dictionary cannot say");
   CLI::Option* const nulls = app.add_flag("--nulls", problem.nulls, "hide nothing in any campaign: every name is a false alarm")->excludes(pairs)->excludes("--outside");
   app.add_flag("--law", problem.laws, "hide a law in each campaign, in turn those of the dictionary that `diagnose` searches, with parameters drawn; two more runs are held out")->excludes(pairs)->excludes(nulls)->excludes(effects);
-  app.add_flag("--ideal", problem.ideal, "white noise, exact files and steady signals. Without it noise may be first-order, pink, heavy-tailed or quantised, in half of the campaigns one kind of number in the files is off, and the phase of vortex shedding walks");
+  app.add_flag("--ideal", problem.ideal, "white noise, exact files and steady signals. Without it noise may be first-order, pink, heavy-tailed or quantised, in a quarter of the campaigns one kind of number in the files is off, in another all are and the files state by how much, and the phase of vortex shedding walks");
   app.add_option("--shard", shard, "i/n: only every n-th campaign, from the i-th on, for `unrig collect` to put together; without it, what falls to this task of Slurm (SLURM_ARRAY_TASK_ID) or this rank of Open MPI");
   app.add_option("--cases", problem.cases, "folder in which the outcome of each campaign is kept: a second call computes only what is missing");
   app.add_option_function<int>("--threads", use_threads, "how many threads to work in; without it, as many as the machine has")->check(CLI::Range(1, 256));

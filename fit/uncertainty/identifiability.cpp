@@ -82,9 +82,9 @@ void name_undetermined(const LeastSquaresProblem& problem, const LeastSquaresPoi
   const Index count = static_cast<Index>(free.size()), open = count - d.rank;
   if (open == 0) return;
   std::vector<bool> hold_first(static_cast<std::size_t>(count), false);
-  for (std::size_t wanted : options.hold_first)
+  for (std::size_t held : options.hold_first)
     for (std::size_t a = 0; a < free.size(); ++a)
-      if (free[a] == static_cast<Index>(wanted)) hold_first[a] = true;
+      if (free[a] == static_cast<Index>(held)) hold_first[a] = true;
   const MatrixXd basis = d.v.rightCols(open);
   const Indices pivots = choose_pivots(basis, hold_first);
   const MatrixXd follow = basis * MatrixXd(basis(pivots, Eigen::all)).inverse();  // of scaled unknowns: 1 at the own pivot, 0 at the others

@@ -88,6 +88,13 @@ JointInformation joint_information(const JointProblem& joint, const NumberSlopes
   return information;
 }
 
+MatrixXd told_of_deviations(const JointInformation& information, Index deviations) {
+  const Index count = information.of_data.cols() - deviations;
+  const VectorXd scale = information.of_data.diagonal().head(count).cwiseMax(1e-300).cwiseSqrt().cwiseInverse();
+  const MatrixXd of_parameters = scale.asDiagonal() * information.of_data.topLeftCorner(count, count) * scale.asDiagonal(), with = scale.asDiagonal() * information.of_data.topRightCorner(count, deviations);
+  return information.of_data.bottomRightCorner(deviations, deviations) - with.transpose() * of_parameters.ldlt().solve(with);
+}
+
 InexactUncertainty inexact_uncertainty(const JointProblem& joint, const NumberSlopes* numbers) {
   InexactUncertainty whole;
   ParameterUncertainty& u = whole.parameters;

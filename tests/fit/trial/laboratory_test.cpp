@@ -79,7 +79,27 @@ TEST(Laboratory, DrawsEveryKindAndEveryGroup) {
   EXPECT_EQ(kinds.size(), 5u);
   for (const auto& [kind, count] : kinds) EXPECT_NEAR(count, 200, 5 * std::sqrt(160)) << kind;
   EXPECT_NEAR(groups[""], 500, 5 * std::sqrt(250));
-  for (const char* group : {"normal.mass", "normal.station", "section.chord", "speed", "density", "clock", "calibration"}) EXPECT_GT(groups[group], 10) << group;
+  EXPECT_NEAR(groups[as_stated], 250, 5 * std::sqrt(187.5));
+  for (const char* group : {"normal.mass", "normal.station", "section.chord", "speed", "density", "clock", "calibration"}) EXPECT_GT(groups[group], 4) << group;
+}
+
+TEST(Laboratory, StatesWhatAllNumbersAreOffBy) {
+  const Rig truth = read_rig(test::null_campaign("rig.toml"));
+  const std::vector<unrig::Run> true_runs{read_run(test::null_campaign("step_a.csv")), read_run(test::null_campaign("step_b.csv"))};
+  double squares = 0, count = 0;
+  for (unsigned seed = 1; seed <= 100; ++seed) {
+    Random random(seed);
+    std::pair<Rig, std::vector<unrig::Run>> files{truth, true_runs};
+    misread({NoiseKind::white, 0, 1, 0, as_stated, 0}, files.first, files.second, random);
+    const auto& [rig, runs] = files;
+    ASSERT_TRUE(rig.givens && runs[0].givens && runs[1].givens);
+    for (const Given& g : rig.givens->numbers) {
+      if (g.number == GivenNumber::mass) squares += std::pow((g.value - truth.normal.inertia[g.row]) / g.std, 2), ++count;
+      if (g.number == GivenNumber::chord) squares += std::pow((g.value - truth.chord) / g.std, 2), ++count;
+    }
+    EXPECT_NEAR(runs[0].speed / true_runs[0].speed, runs[1].speed / true_runs[1].speed, 1e-12) << "alike in all runs";
+  }
+  EXPECT_NEAR(squares / count, 1, 0.15) << "errors as large as stated; masses share a part of theirs";
 }
 
 TEST(Laboratory, MisreadsOneKindOfNumberAlikeInAllRuns) {

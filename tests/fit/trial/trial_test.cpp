@@ -7,6 +7,7 @@
 
 #include "core/effects/effect.h"
 #include "core/files/error.h"
+#include "fit/trial/laboratory.h"
 #include "fit/trial/trial_campaign.h"
 #include "tests/support/sample_data.h"
 
@@ -174,6 +175,10 @@ TEST(Trial, OfFilesThatAreOffTheRigsDescriptionIsNoFalseName) {
   o.found = {"rig-description", "tank-wave"};
   EXPECT_TRUE(o.right());
   o.found = {"gauge-drift"};
+  EXPECT_TRUE(o.false_name());
+  o.misread = as_stated;
+  o.found = {"rig-description", "tank-wave"};
+  EXPECT_FALSE(o.right()) << "what the files state is nothing missing";
   EXPECT_TRUE(o.false_name());
 }
 
