@@ -129,14 +129,20 @@ double AeroelasticModel::circulation_amplitude(const VectorXd& theta, Index k) c
 }
 
 LinearSystem AeroelasticModel::system(const Conditions& conditions, const VectorXd& theta, const std::vector<std::string>& channels) const {
+  const bool off = rig_.deviations > 0 && conditions.deviations != nullptr, off_in_all = off && conditions.deviations->whole;
+  LinearSystem system = with_effects_at_work(conditions, theta, channels, off && !off_in_all);
+  if (off_in_all) add_deviations(system, *conditions.deviations, theta, first_deviation_);
+  return system;
+}
+
+LinearSystem AeroelasticModel::with_effects_at_work(const Conditions& conditions, const VectorXd& theta, const std::vector<std::string>& channels, bool rig_is_off) const {
   const auto gauge = std::find(channels.begin(), channels.end(), "gauge");
   const auto amplify = [&](LinearSystem s) {
     if (gauge != channels.end())
       for (const GaugeFilter& filter : rig_.gauge_filters) append_gauge_filter(s, gauge - channels.begin(), filter);
     return s;
   };
-  const bool exact = rig_.deviations == 0 || conditions.deviations == nullptr;
-  if (effects_.empty() && exact) {
+  if (effects_.empty() && !rig_is_off) {
     LinearSystem system = rig_.is_modal() ? modal_system(conditions, theta, channels) : amplify(beam_system(conditions, theta, channels));
     std::vector<Index> recorded{0, 1, 2};
     recorded.resize(static_cast<std::size_t>(system.B.cols()));
@@ -147,7 +153,7 @@ LinearSystem AeroelasticModel::system(const Conditions& conditions, const Vector
   Conditions with_ports = conditions;
   with_ports.force = with_ports.mount = with_ports.ports = true;
   LinearSystem system = rig_.is_modal() ? modal_system(with_ports, theta, channels) : beam_system(with_ports, theta, channels);
-  if (!exact) add_deviations(system, *conditions.deviations, theta, first_deviation_);
+  if (rig_is_off) add_deviations(system, *conditions.deviations, theta, first_deviation_);
   const auto strips = static_cast<Index>(rig_.submerged.size());
   Index first = theta.size();
   for (const std::string& id : effects_) first -= static_cast<Index>(effect(rig_, id).parameters_on(rig_).size());

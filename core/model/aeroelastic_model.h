@@ -143,6 +143,7 @@ class AeroelasticModel {
  private:
   LinearSystem beam_system(const Conditions&, const Eigen::VectorXd&, const std::vector<std::string>&) const;
   LinearSystem modal_system(const Conditions&, const Eigen::VectorXd&, const std::vector<std::string>&) const;
+  LinearSystem with_effects_at_work(const Conditions&, const Eigen::VectorXd&, const std::vector<std::string>&, bool rig_is_off) const;
   void list_deviations();
 
   Rig rig_;

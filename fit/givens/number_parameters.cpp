@@ -77,7 +77,7 @@ FilesToFit with_numbers_as_parameters(const FitProblem& stated, const std::vecto
     const std::size_t like = fitted ? r : most_alike(exact.joint, all[r]);
     auto slopes = std::make_shared<DeviationSlopes>();
     for (const Basis& basis : bases) {
-      const SystemSlopes system(exact.joint, like, basis, numbers, as_stated, r, fitted ? exact.joint.runs()[r].conditions() : conditions_of(all[r]), false);
+      const SystemSlopes system(SystemSlopes::Of::rig, exact.joint, like, basis, numbers, as_stated, r, fitted ? exact.joint.runs()[r].conditions() : conditions_of(all[r]), false);
       slopes->outputs = system.outputs();
       slopes->by_states[system.states()] = along(directions, system.all());
     }

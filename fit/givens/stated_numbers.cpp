@@ -28,10 +28,10 @@ MatrixXd with_deviations_last(const MatrixXd& columns, Index own, Index deviatio
 void look_at_run(const Arrival& at, const StatedNumbers& numbers, const VectorXd& z, std::size_t r, NumberSlopes& slopes) {
   const RunResidual& now = at.joint.runs()[r];
   const Index deviations = numbers.deviations();
-  const SystemSlopes system(at.joint, r, at.model->basis(), numbers, z, r, now.conditions(), reading_of_steady_load(now) != 0);
+  const SystemSlopes system(SystemSlopes::Of::whole, at.joint, r, at.model->basis(), numbers, z, r, now.conditions(), reading_of_steady_load(now) != 0);
   const std::vector<NumberSlope> table = system.all();
   Run with_deviations = now.run();
-  with_deviations.deviations = std::make_shared<const DeviationSlopes>(DeviationSlopes{system.outputs(), {{system.states(), {table.begin(), table.end()}}}});
+  with_deviations.deviations = std::make_shared<const DeviationSlopes>(DeviationSlopes{true, system.outputs(), {{system.states(), {table.begin(), table.end()}}}});
   Rig rig = at.model->rig();
   rig.deviations = deviations;
   const AeroelasticModel model = AeroelasticModel(rig, at.model->basis(), at.model->circulation()).with_effects(at.model->effect_ids());
@@ -40,7 +40,7 @@ void look_at_run(const Arrival& at, const StatedNumbers& numbers, const VectorXd
   run.follow_in(now.finer());
   run.start_from(now);
   const VectorXd theta = at.joint.theta(r);
-  const Index own = system.own_parameters();
+  const Index own = static_cast<Index>(AeroelasticModel(at.model->rig(), at.model->basis(), at.model->circulation()).parameters().size());
   VectorXd extended = VectorXd::Zero(theta.size() + deviations);
   extended.head(own) = theta.head(own);
   extended.tail(theta.size() - own) = theta.tail(theta.size() - own);

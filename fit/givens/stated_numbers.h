@@ -55,7 +55,7 @@ struct NumberSlopes {
 
 /// At the present values of the fit, which stands at z. The deviations are parameters of each run's linear system, with slopes from central differences of its matrices, and are followed along the record
 /// as the model's own are: Kaufman's rule for what is linear, like theirs. (Differences of residuals keep the rule's other term, which looks like information on numbers that only noise tells.)
-/// Effects take the numbers as they are.
+/// Effects at work move with the numbers too, but for what a law looks at.
 NumberSlopes number_slopes(const Arrival& at, const StatedNumbers& numbers, const Eigen::VectorXd& z);
 
 }  // namespace unrig

@@ -38,9 +38,9 @@ void add_clock(const LinearSystem& system, double rate, SystemSlope& slope) {
 
 }  // namespace
 
-SystemSlopes::SystemSlopes(const JointProblem& fit, std::size_t like, const Basis& basis, const StatedNumbers& numbers, const VectorXd& z, std::size_t run, const Conditions& conditions, bool reads_a_steady_load)
-    : fit_(fit), basis_(basis), numbers_(numbers), z_(z), run_(run), reads_a_steady_load_(reads_a_steady_load), conditions_(conditions) {
-  conditions_.force = conditions_.mount = conditions_.ports = true;  // as AeroelasticModel::system has them before an effect
+SystemSlopes::SystemSlopes(Of what, const JointProblem& fit, std::size_t like, const Basis& basis, const StatedNumbers& numbers, const VectorXd& z, std::size_t run, const Conditions& conditions, bool reads_a_steady_load)
+    : what_(what), fit_(fit), basis_(basis), numbers_(numbers), z_(z), run_(run), reads_a_steady_load_(reads_a_steady_load), conditions_(conditions) {
+  if (what == Of::rig) conditions_.force = conditions_.mount = conditions_.ports = true;  // as AeroelasticModel::system has them before an effect
   const AeroelasticModel here = model_of(fit.model().rig());
   channels_ = here.output_channels(numbers.stated_run(run));
   theta_ = fit.theta(like).head(static_cast<Index>(here.parameters().size()));
@@ -77,11 +77,11 @@ std::vector<NumberSlope> SystemSlopes::all() const {
 }
 
 AeroelasticModel SystemSlopes::model_of(Rig rig) const {
-  rig.gauge_filters.clear();
-  rig.laws.clear();
   rig.deviations = 0;
+  if (what_ == Of::rig) rig.gauge_filters.clear();
   Basis own = make_basis(rig, basis_.normal_modes, basis_.torsion_modes);
-  return {std::move(rig), std::move(own), fit_.model().circulation()};
+  const AeroelasticModel model(std::move(rig), std::move(own), fit_.model().circulation());
+  return what_ == Of::rig ? model : model.with_effects(fit_.model().effect_ids());
 }
 
 void SystemSlopes::add_difference(Index deviation, double step, double weight, NumberSlope& slope) const {

@@ -18,11 +18,11 @@ struct NumberSlope : SystemSlope {
 /// The slopes of one run's system in the deviations of stated numbers, by central differences of its matrices, which depend on the numbers smoothly however long the record is.
 class SystemSlopes {
  public:
+  /// Of the rig alone, as effects find it, or with the effects of the fit: DeviationSlopes::whole.
+  enum class Of { rig, whole };
   /// Of run `run` of `numbers`, off by z, with the parameters that the fit has for its run `like` and the modes of `basis`. Looks at all of them.
-  SystemSlopes(const JointProblem& fit, std::size_t like, const Basis& basis, const StatedNumbers& numbers, const Eigen::VectorXd& z, std::size_t run, const Conditions& conditions, bool reads_a_steady_load);
+  SystemSlopes(Of what, const JointProblem& fit, std::size_t like, const Basis& basis, const StatedNumbers& numbers, const Eigen::VectorXd& z, std::size_t run, const Conditions& conditions, bool reads_a_steady_load);
 
-  /// Of the rig's own parameters, without effects.
-  Eigen::Index own_parameters() const { return theta_.size(); }
   Eigen::Index states() const { return system_.states(); }
   const std::vector<std::string>& outputs() const { return channels_; }
   NumberSlope of(Eigen::Index deviation) const;
@@ -33,6 +33,7 @@ class SystemSlopes {
   AeroelasticModel model_of(Rig rig) const;
   void add_difference(Eigen::Index deviation, double step, double weight, NumberSlope& slope) const;
 
+  Of what_;
   const JointProblem& fit_;
   const Basis& basis_;
   const StatedNumbers& numbers_;

@@ -5,6 +5,7 @@
 
 #include <cmath>
 #include <functional>
+#include <numbers>
 #include <random>
 
 #include <nlohmann/json.hpp>
@@ -254,6 +255,25 @@ TEST(Price, OfOnePerCentIsWhatFitsOfChangedFilesGave) {
   EXPECT_NEAR(of("speed", "normal_force_slope"), speed, 0.03) << "bent by as much over one per cent";
   EXPECT_NEAR(of("clock", "normal.stiffness_scale"), -0.2, printed / 10);
   EXPECT_NEAR(of("density", "apparent_mass_coefficient") / 2, -0.5, printed / 2);
+}
+
+/// A hum of 50 Hz by a clock that is known to 0.1 %: an effect's own numbers are as uncertain as what they are told with.
+TEST(InexactRig, AFrequencyIsKnownAsTheClockIs) {
+  FitProblem problem = null_problem(five_runs);
+  for (unrig::Run& run : problem.runs) {
+    run = test::run_that_states(run.file, "clock_std_percent = 0.1");
+    for (Channel& channel : run.channels)
+      if (channel.name == "gauge")
+        for (Index k = 0; k < channel.value.size(); ++k) channel.value[k] += 0.3 * std::sin(2 * std::numbers::pi * 50 * run.time(k));
+  }
+  problem.effects = {"mains-hum"};
+  const FitResult result = fit(problem);
+  const FittedParameter& frequency = parameter(result, "mains-hum.frequency");
+  const FittedGiven& clock = result.givens.front();
+  EXPECT_EQ(clock.name, "clock");
+  EXPECT_GT(clock.std_error, 1e-4) << "of the time that the stream takes along the chord, too";
+  EXPECT_NEAR(frequency.value, 50 / clock.value, 0.001);
+  EXPECT_NEAR(frequency.std_error, 50 * clock.std_error, 0.02 * frequency.std_error);
 }
 
 }  // namespace
