@@ -129,9 +129,9 @@ double AeroelasticModel::circulation_amplitude(const VectorXd& theta, Index k) c
 }
 
 LinearSystem AeroelasticModel::system(const Conditions& conditions, const VectorXd& theta, const std::vector<std::string>& channels) const {
-  const bool off = rig_.deviations > 0 && conditions.deviations != nullptr, off_in_all = off && conditions.deviations->whole;
-  LinearSystem system = with_effects_at_work(conditions, theta, channels, off && !off_in_all);
-  if (off_in_all) add_deviations(system, *conditions.deviations, theta, first_deviation_);
+  const bool off = rig_.deviations > 0 && conditions.deviations != nullptr, in_all = off && conditions.deviations->whole;
+  LinearSystem system = with_effects_at_work(conditions, theta, channels, off && !in_all);
+  if (in_all && !conditions.ports) add_deviations(system, *conditions.deviations, theta, first_deviation_);
   return system;
 }
 
