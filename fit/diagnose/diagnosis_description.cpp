@@ -144,9 +144,7 @@ void tell_fit(const DiagnoseProblem& problem, const FilesToFit& files, const Sea
   }
   const FitProblem errors = with_errors_of_files(problem);
   AtItsNumbers there = at_its_numbers(errors, of_files ? deviations_at(files, found.best.arrival.joint) : found.setting.off, found.best.arrival, found.best.effects);
-  if (!limits.describe([&] { found.fit = fit_with_numbers(errors, there, settled(found.best)); })) {
-    found.fit = told_with_numbers_known(errors, there, Settle::nothing, limits);
-  }
+  if (!limits.describe([&] { found.fit = fit_with_numbers(errors, there, settled(found.best)); })) found.fit = told_with_numbers_known(errors, there, Settle::nothing, limits);
   found.fitted = std::move(there.problem);
 }
 

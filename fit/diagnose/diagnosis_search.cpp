@@ -20,7 +20,6 @@ namespace {
 
 using Eigen::Index;
 
-
 /// So short that nothing missing could be seen: "nothing is missing" would be no answer.
 void refuse_short_runs(const JointProblem& joint) {
   check_lengths(joint);

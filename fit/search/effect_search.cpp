@@ -159,7 +159,7 @@ const Trial& better_of(const Trial& a, const Trial& b) { return a.reduced_chi2()
 
 double deviance_difference(const Trial& a, const Trial& b) {
   const Trial& better = better_of(a, b);
-  double difference = 0;
+  double difference = a.arrival.joint.beside_runs() - b.arrival.joint.beside_runs();
   for (std::size_t r = 0; r < a.variance.size(); ++r) {
     difference += better.samples[r] * (std::log(a.variance[r] / b.variance[r]) + log_unit(a.arrival.joint.runs()[r]) - log_unit(b.arrival.joint.runs()[r]));
     // Of a run that is not explained the gauge is weighted down, and does not bend the motion.

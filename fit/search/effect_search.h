@@ -47,7 +47,7 @@ bool brings_a_law(const Trial& trial);
 /// Whether an effect is a signal with amplitudes of its own in each run, which take a share of anything that lies at its frequencies.
 bool is_a_signal(const std::string& id, const JointProblem& joint);
 
-/// -2 ln likelihood of the gauge with each run's own variance, and of the angle where both explain the run, plus ln(samples) per variable, of `a` less that of `b`
+/// -2 ln likelihood of the gauge with each run's own variance, and of the angle where both explain the run, of parameters about which something is known beside the runs (Parameter::known_to), plus ln(samples) per variable, of `a` less that of `b`
 /// (G. Schwarz, Annals of Statistics 6 (1978) 461). Samples of the gauge count by the colour of the better of the two.
 double bic_difference(const Trial& a, const Trial& b);
 /// The same without what variables cost: -2 ln likelihood.
