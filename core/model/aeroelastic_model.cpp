@@ -36,9 +36,10 @@ void keep_inputs(LinearSystem& system, const std::vector<Index>& recorded) {
       if (m->rows() > 0) m->conservativeResizeLike(MatrixXd::Zero(m->rows(), system.states()));
 }
 
-/// Errors of numbers, from the parameter `first` on.
+/// Errors of numbers, from the parameter `first` on. Slopes of the run's own inputs say nothing of a system with others, such as a force that lets go.
 void add_deviations(LinearSystem& system, const DeviationSlopes& slopes, const VectorXd& theta, Index first) {
   const std::vector<SystemSlope>& of = slopes.by_states.at(system.states());
+  if (of.empty() || of.front().B.cols() != system.B.cols()) return;
   const auto add = [&](DualMatrix& to, Index row, Index parameter, const MatrixXd& slope) {
     if (slope.isZero(0)) return;
     MatrixXd change = MatrixXd::Zero(to.rows(), to.cols());
@@ -131,7 +132,7 @@ double AeroelasticModel::circulation_amplitude(const VectorXd& theta, Index k) c
 LinearSystem AeroelasticModel::system(const Conditions& conditions, const VectorXd& theta, const std::vector<std::string>& channels) const {
   const bool off = rig_.deviations > 0 && conditions.deviations != nullptr, in_all = off && conditions.deviations->whole;
   LinearSystem system = with_effects_at_work(conditions, theta, channels, off && !in_all);
-  if (in_all && !conditions.ports) add_deviations(system, *conditions.deviations, theta, first_deviation_);
+  if (in_all) add_deviations(system, *conditions.deviations, theta, first_deviation_);
   return system;
 }
 

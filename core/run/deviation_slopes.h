@@ -13,7 +13,7 @@ struct SystemSlope {
 
 /// How the system of one run moves with errors of the numbers of rig file and head, each in units of its standard deviation, about some values of the model's parameters.
 struct DeviationSlopes {
-  bool whole = false;                                          ///< of the system as it is without ports, where it has them errors do not show; otherwise of the rig alone, over all ports, before effects and what lies behind the bridge
+  bool whole = false;                                          ///< of the whole system with the run's own inputs, and of none with others; otherwise of the rig alone, over all ports, before effects and what lies behind the bridge
   std::vector<std::string> outputs;                            ///< whose rows C and D have
   std::map<Eigen::Index, std::vector<SystemSlope>> by_states;  ///< of the systems with so many states, which each basis has its own of: one for each error
 };
