@@ -9,6 +9,7 @@ namespace {
 
 Diagnosis diagnose_in_order(const DiagnoseProblem& problem) {
   DiagnosisSearch search(problem);
+  search.settle_noise();
   search.ask_about_noise();
   search.ask_about_description();
   search.try_without_a_law();

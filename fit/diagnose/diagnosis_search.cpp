@@ -107,6 +107,13 @@ void DiagnosisSearch::begin_selection() {
   found_ = look_at(problem_, files(), baseline_, files(), baseline_, 0);
 }
 
+void DiagnosisSearch::settle_noise() {
+  limits_.spend([&] {
+    if (std::optional<Trial> with = Selection(problem_, fit_problem_, baseline_).with_known_lines()) take_levels_of(baseline_, std::move(*with));
+  });
+  mismatch_ = locate_mismatch(baseline_.arrival.joint);
+}
+
 void DiagnosisSearch::ask_about_noise() {
   if (!mismatch_.found) return;
   if (Trial coloured = baseline_; explained_by_noise(coloured)) {

@@ -26,6 +26,8 @@ class DiagnosisSearch {
   DiagnosisSearch(const DiagnosisSearch&) = delete;
   DiagnosisSearch& operator=(const DiagnosisSearch&) = delete;
 
+  /// The levels of white noise, without lines of mains.
+  void settle_noise();
   /// Noise of a colour: whether it explains the mismatch, and better than effects in white noise do.
   void ask_about_noise();
   /// The numbers of the files, where a step in them promises to explain the mismatch.

@@ -351,11 +351,24 @@ void Selection::stop() {
   stopped_ = true;
 }
 
+/// Signals at a frequency that is known beforehand whose lines stand out of what a fit leaves.
+Strings Selection::known_lines(const Trial& of) const {
+  Strings ids = candidates(of.effects, {});
+  std::erase_if(ids, [&](const std::string& id) { return effect(id).bands.empty() || !has_line(of.arrival.joint, effect(id)); });
+  return ids;
+}
+
+std::optional<Trial> Selection::with_known_lines() const {
+  const Strings ids = known_lines(baseline_);
+  if (ids.empty()) return std::nullopt;
+  Trial with = prepare(fit_problem_, baseline_, ids);
+  fit_fully(with, 2);
+  return with;
+}
+
 /// Far from the noise a signal at a frequency that is known beforehand (Effect::bands) is drowned in what else is left, and yet nothing else makes its line: it is taken out first, or laws have it to follow.
 void Selection::take_known_lines(Trial& best) {
-  for (const std::string& id : candidates({}, {})) {
-    const Effect& e = effect(id);
-    if (e.bands.empty() || !has_line(best.arrival.joint, e)) continue;
+  for (const std::string& id : known_lines(best)) {
     tell("taking out " + id);
     Strings set = best.effects;
     set.push_back(id);

@@ -42,6 +42,9 @@ class Selection {
   /// `other` explains everything without an effect: a law that promises less than half of what it takes beyond a set, or a signal that promises less than a quarter, does not come out ahead beside that, and is not fitted.
   void hold_against(const Trial& other) { held_against_ = other.variance; }
 
+  /// The baseline with those signals at frequencies that are known beforehand (Effect::bands) whose lines stand out; none where there are none.
+  std::optional<Trial> with_known_lines() const;
+
   /// `best`, or what explains the runs better with another effect of the list in place of a member: each is challenged by those that were not fitted and promise half of what it takes.
   Trial challenged(Trial best);
 
@@ -61,6 +64,7 @@ class Selection {
   Trial settled(Trial trial);
   void grow(Trial& best, const std::function<bool(const Trial&)>& enough, std::optional<Trial>& sufficient);
   void stop();
+  std::vector<std::string> known_lines(const Trial& of) const;
   void take_known_lines(Trial& best);
   /// Whether nothing has been found beside them.
   bool is_first(const Trial& base) const { return base.effects.size() == lines_.size(); }

@@ -38,7 +38,13 @@ RunResidual::Colours in_size_of(const RunResidual& run, const std::vector<Channe
 
 }  // namespace
 
+void settle_noise(JointProblem& joint) {
+  for (std::size_t r = 0; r < joint.runs().size(); ++r)
+    if (RunResidual& run = joint.runs()[r]; !run.is_aside()) run.settle_noise(joint.theta(r));
+}
+
 bool take_noise_colour(Trial& trial) {
+  settle_noise(trial.arrival.joint);  // levels that differ from run to run by what a fast signal added hide a colour
   const std::vector<ChannelColour> in_common = noise_colours(trial.arrival.joint);
   return take_colours(trial, in_common, [&](const RunResidual& run, const Eigen::VectorXd& theta) { return run.colours(theta, in_common); });
 }
@@ -57,6 +63,17 @@ void take_noise_of(Trial& trial, const Trial& other) {
   const std::vector<RunResidual>& known = other.arrival.joint.runs();
   JointProblem& joint = trial.arrival.joint;
   for (std::size_t r = 0; r < joint.runs().size(); ++r) joint.runs()[r].keep_noise_of(known[r]);
+  fit_fully(trial, 5);
+}
+
+void take_levels_of(Trial& trial, Trial without_tones) {
+  settle_noise(without_tones.arrival.joint);
+  const std::vector<RunResidual>& settled = without_tones.arrival.joint.runs();
+  JointProblem& joint = trial.arrival.joint;
+  bool any_lower = false;
+  for (std::size_t r = 0; r < settled.size(); ++r) any_lower = any_lower || settled[r].sigma(0) < joint.runs()[r].sigma(0);
+  if (!any_lower) return;
+  for (std::size_t r = 0; r < settled.size(); ++r) joint.runs()[r].keep_noise_of(settled[r]);
   fit_fully(trial, 5);
 }
 

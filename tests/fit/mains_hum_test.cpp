@@ -7,6 +7,7 @@
 #include <cmath>
 #include <numbers>
 #include <random>
+#include <string>
 
 #include "fit/diagnose/diagnose.h"
 #include "fit/fit.h"
@@ -78,6 +79,37 @@ TEST(MainsHum, IsNamedByADiagnosis) {
     ASSERT_EQ(d.missing.size(), 1u) << line << " Hz at " << rate << (d.closest.empty() ? "" : ", closest is " + d.closest.front().effect);
     EXPECT_EQ(d.missing.front().effect, "mains-hum");
   }
+}
+
+/// Adds noise of first order of that many newtons below 20 Hz, and harmonics of the line so many times the noise.
+Run with_coloured_noise(Run run, double coloured, double harmonics, unsigned seed) {
+  std::mt19937_64 random(seed);
+  std::normal_distribution<double> normal;
+  const double a = std::exp(-2 * pi * 20 * run.dt);
+  VectorXd& gauge = run.channels.front().value;
+  double n = coloured * normal(random);
+  for (Index k = 0; k < gauge.size(); ++k) {
+    const double t = run.dt * static_cast<double>(k);
+    gauge[k] += n + harmonics * noise * (std::sin(2 * pi * 100.1 * t + 0.3) + std::sin(2 * pi * 150.15 * t));
+    n = a * n + std::sqrt(1 - a * a) * coloured * normal(random);
+  }
+  return run;
+}
+
+/// Differences take harmonics for noise: levels ten times too high in some of the runs hid the colour that all have in common, and a wandering force was named beside the mains.
+TEST(MainsHum, HidesNoColourOfTheNoise) {
+  DiagnoseProblem problem;
+  problem.rig = one_mode();
+  unsigned seed = 12;
+  for (const double harmonics : {0.3, 8.0, 12.0}) {
+    problem.runs.push_back(with_coloured_noise(decay_with_line(50.05, 500, seed), 1.5 * noise, harmonics, seed + 5));
+    problem.runs.back().file = "decay_" + std::to_string(seed++) + ".csv";
+  }
+  problem.verdict_only = true;
+  const Diagnosis d = diagnose(problem);
+  ASSERT_EQ(d.missing.size(), 1u) << (d.closest.empty() ? "" : ", closest is " + d.closest.front().effect);
+  EXPECT_EQ(d.missing.front().effect, "mains-hum");
+  EXPECT_FALSE(d.unexplained);
 }
 
 /// "45.47 Hz" was named once, whose third harmonic sat on a mode of the structure.
