@@ -96,7 +96,7 @@ Run with_coloured_noise(Run run, double coloured, double harmonics, unsigned see
   return run;
 }
 
-/// Differences take harmonics for noise: levels ten times too high in some of the runs hid the colour that all have in common, and a wandering force was named beside the mains.
+/// Differences take harmonics for noise: levels ten times too high in some of the runs hid the colour that all have in common, and the runs stayed unexplained.
 TEST(MainsHum, HidesNoColourOfTheNoise) {
   DiagnoseProblem problem;
   problem.rig = one_mode();
